@@ -1,0 +1,124 @@
+//! What labelers do, and what of it a learner may train on.
+
+use serde::{Deserialize, Serialize};
+
+/// One of the two places on the page.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Side {
+    /// The left clip.
+    Left,
+    /// The right clip.
+    Right,
+}
+
+/// One of a query's two segments.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Which {
+    /// σ₀.
+    First,
+    /// σ₁.
+    Second,
+}
+
+impl Which {
+    /// The segment shown on `side` when `self` is shown on the left.
+    #[must_use]
+    pub fn shown_on(self, side: Side) -> Self {
+        match side {
+            Side::Left => self,
+            Side::Right => self.other(),
+        }
+    }
+
+    /// The other one.
+    #[must_use]
+    pub fn other(self) -> Self {
+        match self {
+            Self::First => Self::Second,
+            Self::Second => Self::First,
+        }
+    }
+}
+
+/// What a labeler may say to "which is better?".
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Answer {
+    /// The left clip is better.
+    Left,
+    /// The right clip is better.
+    Right,
+    /// They cannot be told apart.
+    Equal,
+    /// No judgement: a bad clip, or it cannot be told. Uses no budget.
+    Skip,
+}
+
+impl Answer {
+    /// What a learner may see. Skips carry no information, so they never become a preference.
+    pub fn preference(self, shown_left: Which) -> Option<Preference> {
+        match self {
+            Self::Left => Some(Preference::Prefer(shown_left)),
+            Self::Right => Some(Preference::Prefer(shown_left.other())),
+            Self::Equal => Some(Preference::Equal),
+            Self::Skip => None,
+        }
+    }
+}
+
+/// What a labeler may say to "same stage?".
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum StageJudgement {
+    /// Both segments show the same stage of the task.
+    Same,
+    /// They show different stages.
+    Different,
+    /// No judgement.
+    Skip,
+}
+
+/// An answer that a learner may train on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Preference {
+    /// This segment is better.
+    Prefer(Which),
+    /// Indistinguishable.
+    Equal,
+}
+
+impl Preference {
+    /// Target of P(second ≻ first): 0, 1 or ½.
+    pub fn target(self) -> f32 {
+        match self {
+            Self::Prefer(Which::First) => 0.0,
+            Self::Prefer(Which::Second) => 1.0,
+            Self::Equal => 0.5,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sides_swapped_the_meaning_stays() {
+        assert_eq!(
+            Answer::Left.preference(Which::First),
+            Answer::Right.preference(Which::Second)
+        );
+        assert_eq!(
+            Answer::Equal.preference(Which::First),
+            Some(Preference::Equal)
+        );
+    }
+
+    #[test]
+    fn a_skip_never_becomes_a_preference() {
+        assert_eq!(Answer::Skip.preference(Which::First), None);
+    }
+}

@@ -1,0 +1,68 @@
+//! Two segments put to a labeler.
+
+use serde::{Deserialize, Serialize};
+
+use crate::episode::{Segment, SegmentRecord};
+
+/// Two segments to compare. Which one is shown on the left is decided where it is shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub struct Query {
+    /// The paper's σ₀.
+    pub first: Segment,
+    /// The paper's σ₁.
+    pub second: Segment,
+}
+
+/// Name of a query inside its run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub struct QueryKey {
+    /// Round of asking, from 0.
+    pub session: u32,
+    /// Place in the round, from 0; replacements of skipped queries follow the planned ones.
+    pub index: u32,
+}
+
+/// What is asked about a query.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Question {
+    /// Which segment is better for the task? Trained on.
+    Preference,
+    /// Do the segments show the same stage of the task? Never trained on.
+    SameStage,
+}
+
+/// A chosen query with all that a teacher needs to answer it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct OfferedQuery {
+    /// Its name.
+    pub key: QueryKey,
+    /// σ₀.
+    pub first: SegmentRecord,
+    /// σ₁.
+    pub second: SegmentRecord,
+    /// Whether the stage question is asked as well, after the preference.
+    pub asks_same_stage: bool,
+    /// std over members of P(second ≻ first) when it was chosen, where beliefs were asked.
+    pub disagreement: Option<f32>,
+    /// Stage gap in nats when it was chosen, where beliefs were asked.
+    pub stage_gap: Option<f32>,
+}
+
+impl OfferedQuery {
+    /// The references alone.
+    pub fn query(&self) -> Query {
+        Query {
+            first: self.first.segment,
+            second: self.second.segment,
+        }
+    }
+
+    /// Whether the true stages of all four end states are equal; `None` where the task does
+    /// not know its stages.
+    pub fn is_same_stage(&self) -> Option<bool> {
+        let ends = |s: &SegmentRecord| Some((*s.stages.first()?, *s.stages.last()?));
+        let ((a, b), (c, d)) = (ends(&self.first)?, ends(&self.second)?);
+        Some(a == b && b == c && c == d)
+    }
+}
