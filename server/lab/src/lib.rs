@@ -1,1 +1,6 @@
-//! (to be written)
+//! A run told once, for every method: Algorithm 1 over parts.
+//!
+//! Invariants: knows neither pixels nor SQL nor people; talks to the world through
+//! [`message`] and [`domain::teacher::Teacher`] alone; a method is a recipe of parts.
+
+pub mod message;
