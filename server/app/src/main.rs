@@ -1,2 +1,21 @@
-//! (to be written)
-fn main() {}
+//! `stair`: people take part in a run. HTTP, pages and the command line.
+//!
+//! Invariants: the only crate that knows everyone; what a run needs to know about people
+//! reaches it through [`live`] alone; no page and no handler touches tensors or the GPU.
+
+#![expect(
+    unreachable_pub,
+    reason = "an executable: nothing outside reaches into it"
+)]
+
+use std::process::ExitCode;
+
+mod assets;
+mod cli;
+mod problem;
+mod router;
+mod state;
+
+fn main() -> ExitCode {
+    cli::main()
+}

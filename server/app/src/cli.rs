@@ -1,0 +1,61 @@
+//! The command line: one file per command, each with `Args` and `run`.
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+mod serve;
+
+/// Train agents from human preferences, segment by segment (STAIR).
+#[derive(Debug, Parser)]
+#[command(name = "stair", version = VERSION, max_term_width = 100)]
+#[command(after_help = "Examples:
+  stair serve                       open http://127.0.0.1:8080 and choose a task
+  stair serve --bind 127.0.0.1:9000 --data ~/stair")]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), " (", env!("STAIR_REVISION"), ")");
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Serve(serve::Args),
+}
+
+/// What the user typed, or a file that they named, does not fit. The program ends with code 2.
+#[derive(Debug)]
+pub struct BadInput(pub String);
+
+impl BadInput {
+    /// An error whose cause is the input, with all that it says.
+    #[expect(
+        clippy::needless_pass_by_value,
+        reason = "so that `map_err` takes it as it is"
+    )]
+    pub fn from_error(error: impl Into<anyhow::Error>) -> anyhow::Error {
+        let error: anyhow::Error = error.into();
+        Self(format!("{error:#}")).into()
+    }
+}
+
+impl std::fmt::Display for BadInput {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for BadInput {}
+
+/// Parses, runs, and turns errors into a line on stderr and an exit code: 2 for bad input, 1
+/// for everything else.
+pub fn main() -> ExitCode {
+    let result = match Cli::parse().command {
+        Command::Serve(args) => serve::run(args),
+    };
+    result.unwrap_or_else(|error| {
+        eprintln!("stair: {error:#}");
+        ExitCode::from(if error.is::<BadInput>() { 2 } else { 1 })
+    })
+}
