@@ -1,0 +1,137 @@
+// Loads a clip and decodes every frame of it once, so that any frame can be shown at any moment.
+import { readMp4 } from './mp4.js';
+
+/** A clip whose bytes arrived but cannot be shown; loading it again would not help. */
+export class BrokenClip extends Error {}
+
+/** All frames of a clip, ready to draw. */
+export class Clip {
+  /**
+   * @param {ImageBitmap[]} frames in order of presentation
+   * @param {number} fps frames per second
+   */
+  constructor(frames, fps) {
+    this.frames = frames;
+    this.fps = fps;
+    this.width = frames[0].width;
+    this.height = frames[0].height;
+  }
+
+  /** Seconds. */
+  get duration() {
+    return this.frames.length / this.fps;
+  }
+
+  /** The frame that is on at `seconds`; the last one stays on afterwards. */
+  indexAt(seconds) {
+    return Math.max(0, Math.min(this.frames.length - 1, Math.floor(seconds * this.fps + 1e-6)));
+  }
+
+  /** Gives the pictures' memory back. */
+  close() {
+    for (const frame of this.frames) frame.close();
+    this.frames = [];
+  }
+}
+
+/**
+ * @param {string} url of an MP4 file
+ * @param {{fps?: number, n_frames?: number}} [known] what the server said about it
+ * @returns {Promise<Clip>} rejects with BrokenClip, or TypeError when the network failed
+ */
+export async function loadClip(url, known = {}) {
+  const response = await fetch(url);
+  if (response.status >= 500) throw new TypeError(`the server answered ${response.status}`);
+  if (!response.ok) throw new BrokenClip(`the clip is not there (${response.status})`);
+  const bytes = await response.arrayBuffer();
+  try {
+    return await decodeExactly(bytes);
+  } catch (reason) {
+    console.info('frames are taken from a video element instead:', reason.message);
+    return decodeBySeeking(bytes, known);
+  }
+}
+
+async function decodeExactly(bytes) {
+  if (typeof VideoDecoder === 'undefined') throw new Error('no WebCodecs here');
+  const file = readMp4(bytes);
+  const config = {
+    codec: file.codec,
+    description: file.description,
+    codedWidth: file.width,
+    codedHeight: file.height,
+    optimizeForLatency: true,
+  };
+  const { supported } = await VideoDecoder.isConfigSupported(config);
+  if (!supported) throw new Error(`${file.codec} is not supported`);
+
+  const pictures = [];
+  let failure = null;
+  const decoder = new VideoDecoder({
+    output(frame) {
+      const timestamp = frame.timestamp;
+      pictures.push(
+        createImageBitmap(frame).then((bitmap) => {
+          frame.close();
+          return { timestamp, bitmap };
+        }),
+      );
+    },
+    error(reason) {
+      failure = reason;
+    },
+  });
+  decoder.configure(config);
+  for (const sample of file.samples) {
+    decoder.decode(
+      new EncodedVideoChunk({ type: sample.isKey ? 'key' : 'delta', timestamp: sample.timestamp, data: sample.data }),
+    );
+  }
+  try {
+    await decoder.flush();
+  } catch (reason) {
+    failure ??= reason;
+  }
+  if (decoder.state !== 'closed') decoder.close();
+  const decoded = await Promise.all(pictures);
+  if (failure || decoded.length !== file.samples.length) {
+    for (const { bitmap } of decoded) bitmap.close();
+    throw failure ?? new Error(`${decoded.length} of ${file.samples.length} frames were decoded`);
+  }
+  decoded.sort((a, b) => a.timestamp - b.timestamp);
+  return new Clip(decoded.map(({ bitmap }) => bitmap), file.fps);
+}
+
+async function decodeBySeeking(bytes, known) {
+  const url = URL.createObjectURL(new Blob([bytes], { type: 'video/mp4' }));
+  const video = document.createElement('video');
+  video.muted = true;
+  video.preload = 'auto';
+  video.src = url;
+  const frames = [];
+  try {
+    await once(video, 'loadeddata');
+    const fps = known.fps ?? 25;
+    const n = known.n_frames ?? Math.max(1, Math.round(video.duration * fps));
+    for (let k = 0; k < n; k += 1) {
+      video.currentTime = (k + 0.5) / fps;
+      await once(video, 'seeked');
+      frames.push(await createImageBitmap(video));
+    }
+    return new Clip(frames, fps);
+  } catch (reason) {
+    for (const frame of frames) frame.close();
+    throw new BrokenClip(reason.message);
+  } finally {
+    video.removeAttribute('src');
+    video.load();
+    URL.revokeObjectURL(url);
+  }
+}
+
+function once(video, event) {
+  return new Promise((resolve, reject) => {
+    video.addEventListener(event, resolve, { once: true });
+    video.addEventListener('error', () => reject(new Error(video.error?.message || 'the browser cannot decode it')), { once: true });
+  });
+}

@@ -1,0 +1,399 @@
+// The labeler's page: one key stores the answer and shows the next pair.
+import { Problem, request, timeOfDay } from './api.js';
+import { drawCurve, foldEvents } from './chart.js';
+import { Outbox } from './outbox.js';
+import { StairPair } from './pair.js';
+import { preparePair, ReadyPairs, releasePair } from './ready.js';
+
+const KEYS = {
+  preference: { 1: 'left', ArrowLeft: 'left', 2: 'right', ArrowRight: 'right', 3: 'equal', ArrowDown: 'equal' },
+  same_stage: { s: 'same', d: 'different' },
+};
+const PLAYER_KEYS = { ' ': 'toggle', ',': 'back', '.': 'forward', '[': 'slower', ']': 'faster', r: 'restart' };
+const WORDS = { left: 'left is better', right: 'right is better', equal: 'about the same', same: 'same stage', different: 'different stages', skip: 'skipped' };
+/** Nobody judges a pair this soon: a key that bounced, or was meant for the pair before. */
+const TOO_SOON_MS = 150;
+/** How often a waiting page asks whether there is something to do. */
+const WAITING_MS = 1_000;
+
+const $ = (id) => document.getElementById(id);
+const page = $('label');
+const run = page.dataset.run;
+const player = $('pair');
+const guidance = $('guidance');
+const reasons = $('reasons');
+
+/** What is on: `{lease, left, right}`, and whether it is an answered one that was gone back to. */
+let current = null;
+let isChanging = false;
+/** Pair that waits, prepared, while an answered one is changed. */
+let interrupted = null;
+let history = [];
+/** An answered pair is being fetched again; what is on stays on and takes no answer. */
+let isTurningBack = false;
+let shownAt = 0;
+let pressedAt = 0;
+let answered = new Set();
+let usesShortcuts = localStorage.getItem('stair-shortcuts') !== 'off';
+let outbox;
+let ready;
+
+async function start() {
+  outbox = await Outbox.open(run);
+  answered = await outbox.answeredLeases();
+  history = await outbox.history();
+  ready = new ReadyPairs(run, (leaseId) => answered.has(leaseId));
+  listen();
+  tellShortcuts();
+  greet();
+  await ready.refill(null);
+  proceed();
+}
+
+// --- showing -----------------------------------------------------------------------------------
+
+/** Puts the next prepared pair on, or says what is being waited for. */
+function proceed() {
+  if (current || isTurningBack) return;
+  const next = interrupted ?? ready.take();
+  interrupted = null;
+  if (next) show(next, null);
+  else {
+    setStage('waiting');
+    refill();
+  }
+}
+
+function show(pair, before) {
+  current = pair;
+  isChanging = before !== null;
+  ready.shown = isChanging ? ready.shown : pair.lease.lease_id;
+  const isStage = pair.lease.question === 'same_stage';
+  page.dataset.question = pair.lease.question;
+  $('question').textContent = isStage ? 'Are both at the same stage of the task?' : 'Which one does better?';
+  $('again').hidden = !isChanging;
+  if (isChanging) $('before').textContent = WORDS[before] ?? before;
+  $('undo').disabled = undoable() === null;
+  shownAt = Infinity;
+  setStage('working');
+  player.show(pair.left, pair.right);
+}
+
+function setStage(stage) {
+  if (page.dataset.stage === stage) return;
+  page.dataset.stage = stage;
+  if (stage === 'waiting') player.clear();
+  $('working').hidden = stage !== 'working';
+  $('waiting').hidden = stage !== 'waiting';
+}
+
+function firstFrameIsOn() {
+  shownAt = performance.now();
+  if (pressedAt) performance.measure('key-to-first-frame', { start: pressedAt, end: shownAt });
+  pressedAt = 0;
+  page.dataset.shown = current?.lease.lease_id ?? '';
+}
+
+// --- answering ---------------------------------------------------------------------------------
+
+/** Stores an answer in the browser, shows what comes next, and lets the outbox send it. */
+function answer(word, input, reason = null, pressed = performance.now()) {
+  const pair = current;
+  if (!pair || isTurningBack || performance.now() - shownAt < TOO_SOON_MS) return;
+  const body = {
+    answer: word,
+    reason,
+    guidance_sha256: page.dataset.guidance,
+    timing: { ...player.watched, input },
+  };
+  const wasChange = isChanging;
+  current = null;
+  isChanging = false;
+  pressedAt = pressed;
+  tellUnsaved();
+  const kept = wasChange ? outbox.change(pair.lease, body) : keepFirst(pair, body);
+  proceed();
+  releasePair(pair);
+  kept
+    .then(() => refill())
+    .catch((failure) => notice(`This browser could not keep the answer: ${failure.message}`, true));
+}
+
+async function keepFirst(pair, body) {
+  answered.add(pair.lease.lease_id);
+  history.push({ lease_id: pair.lease.lease_id, lease: pair.lease, answer: body.answer });
+  $('undo').disabled = undoable() === null;
+  const isNew = await outbox.answer(pair.lease, body);
+  if (isNew) tabs.postMessage(pair.lease.lease_id);
+  else notice('This pair was answered in another tab already; that answer stands.');
+}
+
+function undoable() {
+  const at = isChanging ? history.findIndex((row) => row.lease_id === current.lease.lease_id) : history.length;
+  return at > 0 ? history[at - 1] : null;
+}
+
+/** Goes back to the answered pair before the one that is on. */
+async function undo() {
+  const row = undoable();
+  if (!row || isTurningBack) return;
+  isTurningBack = true;
+  try {
+    const pair = await preparePair(row.lease);
+    if (isChanging) releasePair(current);
+    else interrupted = current ?? interrupted;
+    await showAgain(pair, row);
+  } catch (reason) {
+    notice(`That pair can no longer be shown: ${reason.message}`, true);
+  } finally {
+    isTurningBack = false;
+  }
+}
+
+async function showAgain(pair, row) {
+  const [fresh] = (await outbox.history()).filter((kept) => kept.lease_id === row.lease_id);
+  show(pair, fresh?.answer ?? row.answer);
+  announce(`Back to a pair you answered: ${WORDS[row.answer]}. Answer again to change it.`);
+}
+
+/** Leaves an answered pair as it was. */
+function leaveUnchanged() {
+  if (!isChanging || isTurningBack) return;
+  const leaving = current;
+  current = null;
+  isChanging = false;
+  proceed();
+  releasePair(leaving);
+}
+
+async function skipBroken({ lease, reason }) {
+  answered.add(lease.lease_id);
+  await outbox.answer(lease, {
+    answer: 'skip',
+    reason: `the browser could not show a clip: ${reason.message}`,
+    guidance_sha256: page.dataset.guidance,
+    timing: { visible_ms: 0, hidden_ms: 0, loops: 0, seeks: 0, speed: 1, dropped_frames: 0, input: 'key' },
+  });
+  notice('One pair could not be shown and was passed over. The researcher is told.', true);
+  refill();
+}
+
+// --- the server's words ------------------------------------------------------------------------
+
+let refillTimer = 0;
+
+async function refill() {
+  clearTimeout(refillTimer);
+  await ready.refill(current?.lease.lease_id ?? interrupted?.lease.lease_id);
+  if (!current) proceedIfReady();
+  const isIdle = !current && !ready.isPreparing;
+  if (isIdle) refillTimer = setTimeout(refill, WAITING_MS);
+}
+
+function proceedIfReady() {
+  if (ready.nReady > 0 || interrupted) proceed();
+}
+
+function tellProgress({ state, progress }) {
+  const { answered: n, budget, session, session_answered, session_size } = progress;
+  $('answers').textContent = `${n} of ${budget} answers`;
+  $('bar').max = budget;
+  $('bar').value = n;
+  const hasSession = session !== null && session !== undefined && session_size;
+  $('session').textContent = hasSession ? `round ${session + 1}: ${session_answered} of ${session_size}` : '';
+  if (page.dataset.stage === 'waiting' || !current) tellWaiting(state);
+}
+
+const HEADINGS = {
+  open: 'The next pair is on its way',
+  drawing: 'Drawing the next clips',
+  waiting: 'The agent is practising',
+  held: 'Others are on the remaining pairs',
+  done: 'All done — thank you',
+  paused: 'Paused by the researcher',
+  failed: 'This run has stopped',
+};
+
+function tellWaiting(state) {
+  const card = $('waiting');
+  if (card.dataset.kind !== state.kind) curveAt = 0;
+  card.dataset.kind = state.kind;
+  setText('waiting-title', HEADINGS[state.kind] ?? state.kind);
+  const until = state.until ? ` Until ${timeOfDay(state.until).slice(0, 5)}.` : '';
+  setText('waiting-text', `${state.message ?? ''}${until}`);
+  const progress = state.phase?.progress;
+  const hasProgress = typeof progress === 'number' && (state.kind === 'waiting' || state.kind === 'drawing');
+  $('waiting-bar').hidden = !hasProgress;
+  if (hasProgress) $('waiting-bar').value = progress;
+  $('to-run').hidden = !['done', 'failed', 'paused'].includes(state.kind);
+  tellCurve(state.kind);
+}
+
+let curveAt = 0;
+
+/** Success so far, at most every two seconds, while there is nothing else to look at. */
+async function tellCurve(kind) {
+  if (!['waiting', 'done'].includes(kind) || Date.now() - curveAt < 2_000) return;
+  curveAt = Date.now();
+  const events = await request('GET', `/api/v1/runs/${run}/metrics`).catch(() => null);
+  const points = events ? foldEvents(events).success : [];
+  $('waiting-curve').hidden = points.length < 2;
+  if (points.length >= 2) drawCurve($('waiting-svg'), { series: [{ name: 'success', points }], range: [0, 1], format: percent });
+}
+
+const percent = (value) => `${Math.round(value * 100)} %`;
+
+// --- small words -------------------------------------------------------------------------------
+
+function setText(id, text) {
+  if ($(id).textContent !== text) $(id).textContent = text;
+}
+
+function tellUnsaved() {
+  $('saved').dataset.state = 'sending';
+}
+
+function tellSaved(storedAt) {
+  $('saved').dataset.state = 'saved';
+  setText('saved', `saved ${timeOfDay(storedAt)}`);
+}
+
+function tellWaitingAnswers({ count, isOffline }) {
+  if (count === 0) return;
+  $('saved').dataset.state = 'unsent';
+  const what = count === 1 ? '1 answer is kept here' : `${count} answers are kept here`;
+  setText('saved', `${isOffline ? 'no connection' : 'the server is busy'}: ${what} and sent again`);
+}
+
+let noticeTimer = 0;
+
+function notice(text, isBad = false) {
+  const box = $('notice');
+  box.textContent = text;
+  box.dataset.tone = isBad ? 'bad' : 'plain';
+  box.hidden = false;
+  clearTimeout(noticeTimer);
+  noticeTimer = setTimeout(() => { box.hidden = true; }, 12_000);
+}
+
+function announce(text) {
+  $('announcer').textContent = text;
+}
+
+/** Guidance comes before the first pair, and again when its words have changed. */
+function greet() {
+  if (localStorage.getItem('stair-guidance') === page.dataset.guidance) return;
+  guidance.showModal();
+}
+
+function tellShortcuts() {
+  $('shortcuts').checked = usesShortcuts;
+  page.toggleAttribute('data-no-shortcuts', !usesShortcuts);
+}
+
+// --- input -------------------------------------------------------------------------------------
+
+const tabs = new BroadcastChannel('stair-answered');
+
+function listen() {
+  document.addEventListener('keydown', keyPressed);
+  player.addEventListener('firstframe', firstFrameIsOn);
+  page.addEventListener('click', clicked);
+  ready.addEventListener('state', ({ detail }) => tellProgress(detail));
+  ready.addEventListener('ready', () => { if (!current) proceedIfReady(); });
+  ready.addEventListener('broken', ({ detail }) => skipBroken(detail));
+  ready.addEventListener('offline', () => offline());
+  ready.addEventListener('refused', ({ detail }) => refused(detail));
+  outbox.addEventListener('saved', ({ detail }) => tellSaved(detail.stored_at));
+  outbox.addEventListener('waiting', ({ detail }) => tellWaitingAnswers(detail));
+  outbox.addEventListener('refused', ({ detail }) => notice(detail.message, true));
+  tabs.addEventListener('message', ({ data }) => answeredElsewhere(data));
+  guidance.addEventListener('close', () => {
+    localStorage.setItem('stair-guidance', page.dataset.guidance);
+    if (current && !StairPair.wantsStillness) player.restart();
+  });
+  $('shortcuts').addEventListener('change', () => {
+    usesShortcuts = $('shortcuts').checked;
+    localStorage.setItem('stair-shortcuts', usesShortcuts ? 'on' : 'off');
+    tellShortcuts();
+  });
+}
+
+function offline() {
+  if (current) return;
+  tellWaiting({ kind: 'open', message: 'There is no connection to the server. This page tries again by itself.' });
+}
+
+function refused(problem) {
+  const message = problem instanceof Problem ? problem.message : String(problem);
+  if (!current) tellWaiting({ kind: 'failed', message });
+}
+
+function answeredElsewhere(leaseId) {
+  answered.add(leaseId);
+  ready.drop(leaseId);
+  if (current?.lease.lease_id !== leaseId || isChanging) return;
+  const leaving = current;
+  current = null;
+  player.clear();
+  releasePair(leaving);
+  notice('You answered this pair in another tab; here is the next one.');
+  proceed();
+}
+
+function keyPressed(event) {
+  if (!usesShortcuts || event.ctrlKey || event.metaKey || event.altKey || event.repeat && !PLAYER_KEYS[event.key]) return;
+  if (reasons.open) return reasonPressed(event);
+  if (guidance.open) {
+    if (event.key === '?') guidance.close();
+    return;
+  }
+  if (event.key === '?') return act(event, () => guidance.showModal());
+  const isField = event.target.matches('input, textarea, select');
+  const isScrub = event.target.dataset?.do === 'scrub';
+  if (isField && !isScrub) return;
+  const word = current && KEYS[current.lease.question]?.[event.key];
+  if (word) return act(event, () => answer(word, 'key', null, event.timeStamp));
+  if (event.key === 'z') return act(event, undo);
+  if (event.key === 'Escape') return act(event, leaveUnchanged);
+  if (event.key === 'u' && current) return act(event, askReason);
+  const control = PLAYER_KEYS[event.key];
+  const pressesButton = event.key === ' ' && event.target.matches('button, a, summary');
+  if (control && current && !pressesButton) act(event, () => player.do(control));
+}
+
+function act(event, what) {
+  event.preventDefault();
+  what();
+}
+
+function reasonPressed(event) {
+  const button = reasons.querySelector(`[data-key="${CSS.escape(event.key)}"]`);
+  if (button) act(event, () => skip(button.value, 'key'));
+}
+
+function askReason() {
+  reasons.showModal();
+}
+
+function skip(reason, input) {
+  reasons.close();
+  answer('skip', input, reason);
+}
+
+function clicked(event) {
+  const button = event.target.closest('button');
+  if (!button) return;
+  // The second click of a double click was meant for the pair before.
+  const isSecondClick = event.detail > 1;
+  const input = event.detail === 0 ? 'key' : 'pointer';
+  if (button.dataset.answer && !isSecondClick) answer(button.dataset.answer, input, null, event.timeStamp);
+  else if (button.dataset.reason !== undefined) skip(button.value, input);
+  else if (button.id === 'undo') undo();
+  else if (button.id === 'unsure') askReason();
+  else if (button.id === 'leave') leaveUnchanged();
+  else if (button.id === 'help') guidance.showModal();
+  else if (button.dataset.close !== undefined) button.closest('dialog').close();
+}
+
+start();

@@ -1,0 +1,287 @@
+// <stair-pair>: two clips drawn from one clock, so that they cannot fall out of step.
+//
+// Inside it the page writes two <canvas data-side="left|right">, and whichever controls it wants:
+// buttons with data-do="toggle|back|forward|slower|faster|restart", an <input type="range"
+// data-do="scrub">, an <output data-show="speed|frame">. With attributes `left` and `right`
+// (addresses of clips) it loads them itself once it is in view; with `still` it waits to be played.
+import { loadClip } from './clip.js';
+
+/** Times the recorded pace, slowest first. */
+const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4];
+/** Real seconds that the last frame stays on before the loop starts again. */
+const HOLD_S = 0.5;
+
+/** Fires `firstframe` when both first frames are drawn, `change` when frame, speed or playing changed. */
+export class StairPair extends HTMLElement {
+  #clips = { left: null, right: null };
+  #seconds = 0;
+  #held = 0;
+  #playing = false;
+  #speed = 1;
+  #last = null;
+  #request = 0;
+  #drawn = { left: -1, right: -1 };
+  #observer = null;
+  #watch = emptyWatch();
+
+  connectedCallback() {
+    this.addEventListener('click', (event) => {
+      const what = event.target.closest('[data-do]')?.dataset.do;
+      if (event.target.closest('canvas')) this.toggle();
+      else if (what && what !== 'scrub') this.do(what);
+    });
+    this.addEventListener('input', (event) => {
+      if (event.target.dataset.do === 'scrub') this.seek(Number(event.target.value));
+    });
+    document.addEventListener('visibilitychange', this.#visibilityChanged);
+    if (this.hasAttribute('left')) this.#loadWhenSeen();
+  }
+
+  disconnectedCallback() {
+    document.removeEventListener('visibilitychange', this.#visibilityChanged);
+    this.#observer?.disconnect();
+    cancelAnimationFrame(this.#request);
+    this.#request = 0;
+  }
+
+  /** Whether the person asked their system for less motion. */
+  static get wantsStillness() {
+    return matchMedia('(prefers-reduced-motion: reduce)').matches;
+  }
+
+  get playing() {
+    return this.#playing;
+  }
+
+  get speed() {
+    return this.#speed;
+  }
+
+  /** Frame that is on, from 0; the longer clip counts. */
+  get frame() {
+    const clip = this.#longer();
+    return clip ? clip.indexAt(this.#seconds) : 0;
+  }
+
+  /** What was watched since `show`: for the honest timing that is stored with an answer. */
+  get watched() {
+    this.#countVisibleTime();
+    const { visible, hidden, loops, seeks, dropped } = this.#watch;
+    return {
+      visible_ms: Math.round(visible),
+      hidden_ms: Math.round(hidden),
+      loops,
+      seeks,
+      speed: this.#speed,
+      dropped_frames: dropped,
+    };
+  }
+
+  /** Puts two clips on, at their first frame, and plays them unless stillness is wanted. */
+  show(left, right) {
+    this.#clips = { left, right };
+    this.#drawn = { left: -1, right: -1 };
+    this.#seconds = 0;
+    this.#held = 0;
+    this.#watch = emptyWatch();
+    for (const side of ['left', 'right']) {
+      const canvas = this.#canvas(side);
+      const clip = this.#clips[side];
+      if (!canvas || !clip) continue;
+      if (canvas.width !== clip.width) canvas.width = clip.width;
+      if (canvas.height !== clip.height) canvas.height = clip.height;
+    }
+    const scrub = this.querySelector('[data-do="scrub"]');
+    if (scrub) scrub.max = String(this.#longer().frames.length - 1);
+    this.#draw();
+    this.#playing = !StairPair.wantsStillness && !this.hasAttribute('still');
+    this.#tell();
+    requestAnimationFrame(() => {
+      this.#watch.since = performance.now();
+      this.#watch.started = true;
+      this.dispatchEvent(new CustomEvent('firstframe'));
+    });
+    this.#run();
+  }
+
+  /** Takes the clips off; their memory stays with whoever loaded them. */
+  clear() {
+    this.#playing = false;
+    this.#clips = { left: null, right: null };
+  }
+
+  /** One of the controls by its name. */
+  do(what) {
+    if (!this.#longer()) return;
+    switch (what) {
+      case 'toggle': return this.toggle();
+      case 'back': return this.step(-1);
+      case 'forward': return this.step(1);
+      case 'slower': return this.#changeSpeed(-1);
+      case 'faster': return this.#changeSpeed(1);
+      case 'restart': return this.restart();
+    }
+  }
+
+  toggle() {
+    if (!this.#longer()) return;
+    this.#playing = !this.#playing;
+    if (this.#playing && this.#seconds >= this.#longer().duration) this.#seconds = 0;
+    this.#tell();
+    this.#run();
+  }
+
+  /** Pauses and moves by exactly `n` frames. */
+  step(n) {
+    this.#playing = false;
+    this.seek(this.frame + n);
+  }
+
+  /** Moves both clips to a frame; goes on playing if it was. */
+  seek(frame) {
+    const clip = this.#longer();
+    if (!clip) return;
+    const k = Math.max(0, Math.min(clip.frames.length - 1, Math.round(frame)));
+    this.#seconds = (k + 0.5) / clip.fps;
+    this.#held = 0;
+    this.#watch.seeks += 1;
+    this.#draw();
+    this.#tell();
+  }
+
+  /** From the first frame again, playing. */
+  restart() {
+    this.#seconds = 0;
+    this.#held = 0;
+    this.#playing = true;
+    this.#draw();
+    this.#tell();
+    this.#run();
+  }
+
+  /** Sets the pace to one of the offered ones. */
+  setSpeed(speed) {
+    if (!SPEEDS.includes(speed)) return;
+    this.#speed = speed;
+    this.#tell();
+  }
+
+  #changeSpeed(by) {
+    const at = SPEEDS.indexOf(this.#speed) + by;
+    this.setSpeed(SPEEDS[Math.max(0, Math.min(SPEEDS.length - 1, at))]);
+  }
+
+  #canvas(side) {
+    return this.querySelector(`canvas[data-side="${side}"]`);
+  }
+
+  #longer() {
+    const { left, right } = this.#clips;
+    if (!left || !right) return left ?? right;
+    return left.duration >= right.duration ? left : right;
+  }
+
+  #run() {
+    if (this.#request || !this.#playing) return;
+    this.#last = null;
+    this.#request = requestAnimationFrame(this.#tick);
+  }
+
+  #tick = (now) => {
+    this.#request = 0;
+    if (!this.#playing || !this.#longer()) return;
+    const elapsed = this.#last === null ? 0 : Math.min(0.25, (now - this.#last) / 1000);
+    this.#last = now;
+    this.#advance(elapsed);
+    this.#request = requestAnimationFrame(this.#tick);
+  };
+
+  #advance(elapsed) {
+    const clip = this.#longer();
+    const before = this.frame;
+    this.#seconds += elapsed * this.#speed;
+    if (this.#seconds >= clip.duration) {
+      this.#held += (this.#seconds - clip.duration) / this.#speed;
+      this.#seconds = clip.duration;
+      if (this.#held >= HOLD_S) {
+        this.#seconds = 0;
+        this.#held = 0;
+        this.#watch.loops += 1;
+      }
+    }
+    const after = this.frame;
+    const expected = Math.max(1, Math.ceil((clip.fps * this.#speed) / 50));
+    if (after > before + expected) this.#watch.dropped += after - before - expected;
+    if (after !== before) {
+      this.#draw();
+      this.#tell();
+    }
+  }
+
+  /** Both canvases in one go: the only place that draws. */
+  #draw() {
+    for (const side of ['left', 'right']) {
+      const clip = this.#clips[side];
+      const canvas = this.#canvas(side);
+      if (!clip || !canvas) continue;
+      const index = clip.indexAt(this.#seconds);
+      if (index === this.#drawn[side]) continue;
+      canvas.getContext('2d').drawImage(clip.frames[index], 0, 0);
+      this.#drawn[side] = index;
+    }
+  }
+
+  #tell() {
+    const n = this.#longer()?.frames.length ?? 0;
+    const scrub = this.querySelector('[data-do="scrub"]');
+    if (scrub && document.activeElement !== scrub) scrub.value = String(this.frame);
+    scrub?.setAttribute('aria-valuetext', `frame ${this.frame + 1} of ${n}`);
+    const toggle = this.querySelector('[data-do="toggle"]');
+    if (toggle && toggle.getAttribute('aria-label') !== (this.#playing ? 'Pause' : 'Play')) {
+      toggle.setAttribute('aria-label', this.#playing ? 'Pause' : 'Play');
+    }
+    this.toggleAttribute('playing', this.#playing);
+    const speed = this.querySelector('[data-show="speed"]');
+    if (speed) speed.textContent = `${this.#speed}×`;
+    const frame = this.querySelector('[data-show="frame"]');
+    if (frame) frame.textContent = `${this.frame + 1} / ${n}`;
+    this.dispatchEvent(new CustomEvent('change'));
+  }
+
+  #visibilityChanged = () => {
+    this.#countVisibleTime(document.visibilityState === 'visible');
+  };
+
+  /** Adds the time since the last look to visible or hidden; `wasHidden` says which it was. */
+  #countVisibleTime(wasHidden = document.visibilityState !== 'visible') {
+    if (!this.#watch.started) return;
+    const now = performance.now();
+    this.#watch[wasHidden ? 'hidden' : 'visible'] += now - this.#watch.since;
+    this.#watch.since = now;
+  }
+
+  #loadWhenSeen() {
+    this.#observer = new IntersectionObserver(async ([entry]) => {
+      if (!entry.isIntersecting) {
+        if (this.#playing && this.hasAttribute('loaded')) this.toggle();
+        return;
+      }
+      if (this.hasAttribute('loaded')) return;
+      this.setAttribute('loaded', '');
+      try {
+        const sides = ['left', 'right'].map((side) => this.getAttribute(side));
+        const [left, right] = await Promise.all(sides.map((url) => (url ? loadClip(url) : null)));
+        this.show(left, right);
+      } catch (reason) {
+        this.setAttribute('broken', reason.message);
+      }
+    });
+    this.#observer.observe(this);
+  }
+}
+
+function emptyWatch() {
+  return { started: false, since: 0, visible: 0, hidden: 0, loops: 0, seeks: 0, dropped: 0 };
+}
+
+customElements.define('stair-pair', StairPair);

@@ -1,0 +1,134 @@
+// Pairs that are leased, fetched and decoded before anybody looks at them.
+import { Problem, request } from './api.js';
+import { BrokenClip, loadClip } from './clip.js';
+
+/** The pair on the page and two ahead. */
+const N_LEASES = 3;
+const HEARTBEAT_MS = 60_000;
+const RETRY_MS = 1_000;
+
+/** Fetches and decodes both clips of a lease; tries again while the network is away. */
+export async function preparePair(lease) {
+  for (;;) {
+    const loading = [lease.left, lease.right].map((side) => loadClip(side.clip, side));
+    const results = await Promise.allSettled(loading);
+    const failure = results.find((result) => result.status === 'rejected')?.reason;
+    if (!failure) return { lease, left: results[0].value, right: results[1].value };
+    for (const result of results) result.value?.close();
+    if (failure instanceof BrokenClip) throw failure;
+    await new Promise((resolve) => setTimeout(resolve, RETRY_MS));
+  }
+}
+
+/** Gives a pair's pictures back. */
+export function releasePair(pair) {
+  pair?.left.close();
+  pair?.right.close();
+}
+
+/**
+ * The queue of prepared pairs. Fires `state` (the server's words about the run) after each
+ * question to the server, `ready` when a pair was prepared, `broken` ({lease, reason}), and
+ * `offline` when the server did not reply.
+ */
+export class ReadyPairs extends EventTarget {
+  #run;
+  #isAnswered;
+  #entries = [];
+  #asking = null;
+
+  /**
+   * @param {string} run
+   * @param {(leaseId: string) => boolean} isAnswered leases that must not be shown again
+   */
+  constructor(run, isAnswered) {
+    super();
+    this.#run = run;
+    this.#isAnswered = isAnswered;
+    setInterval(() => this.#heartbeat(), HEARTBEAT_MS);
+  }
+
+  /** Number of pairs that can be shown at once. */
+  get nReady() {
+    return this.#entries.filter((entry) => entry.pair).length;
+  }
+
+  /** Whether pairs are on their way. */
+  get isPreparing() {
+    return this.#entries.length > 0;
+  }
+
+  /** Takes the next pair, in the server's order, or null when it is not decoded yet. */
+  take() {
+    if (!this.#entries[0]?.pair) return null;
+    return this.#entries.shift().pair;
+  }
+
+  /** Forgets a lease that somebody has answered elsewhere. */
+  drop(leaseId) {
+    const entry = this.#entries.find((candidate) => candidate.lease.lease_id === leaseId);
+    if (!entry) return;
+    this.#entries = this.#entries.filter((candidate) => candidate !== entry);
+    releasePair(entry.pair);
+  }
+
+  /** Asks the server for leases up to count, and prepares the new ones. `shown` is on the page. */
+  async refill(shown) {
+    if (this.#asking) return this.#asking;
+    this.#asking = this.#ask(shown).finally(() => {
+      this.#asking = null;
+    });
+    return this.#asking;
+  }
+
+  async #ask(shown) {
+    let reply;
+    try {
+      reply = await request('POST', `/api/v1/runs/${this.#run}/leases`, { count: N_LEASES });
+    } catch (reason) {
+      const isProblem = reason instanceof Problem && !reason.isPassing;
+      this.#tell(isProblem ? 'refused' : 'offline', reason);
+      return;
+    }
+    const offered = new Set(reply.leases.map((lease) => lease.lease_id));
+    for (const { lease } of [...this.#entries]) {
+      if (!offered.has(lease.lease_id)) this.drop(lease.lease_id);
+    }
+    for (const lease of reply.leases) {
+      const isKnown = this.#entries.some((entry) => entry.lease.lease_id === lease.lease_id);
+      if (isKnown || lease.lease_id === shown || this.#isAnswered(lease.lease_id)) continue;
+      this.#prepare({ lease, pair: null });
+    }
+    this.#tell('state', reply);
+  }
+
+  async #prepare(entry) {
+    this.#entries.push(entry);
+    try {
+      entry.pair = await preparePair(entry.lease);
+    } catch (reason) {
+      this.drop(entry.lease.lease_id);
+      this.#tell('broken', { lease: entry.lease, reason });
+      return;
+    }
+    if (this.#entries.includes(entry)) this.#tell('ready', entry.lease);
+    else releasePair(entry.pair);
+  }
+
+  async #heartbeat() {
+    if (document.visibilityState !== 'visible') return;
+    for (const id of [this.shown, ...this.#entries.map((entry) => entry.lease.lease_id)]) {
+      if (!id) continue;
+      await request('POST', `/api/v1/leases/${id}/heartbeat`).catch(() => {
+        // A lease that is gone is noticed when it is answered; the answer is kept aside, not lost.
+      });
+    }
+  }
+
+  /** Lease on the page, kept alive with the others. @type {string | null} */
+  shown = null;
+
+  #tell(type, detail) {
+    this.dispatchEvent(new CustomEvent(type, { detail }));
+  }
+}

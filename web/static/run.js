@@ -1,0 +1,132 @@
+// The researcher's page of one run: curves and state that follow the run as it goes.
+import { request, timeOfDay } from './api.js';
+import { addEvent, compact, drawCurve, emptyCurves } from './chart.js';
+import './pair.js';
+
+const page = document.getElementById('run');
+const run = page.dataset.run;
+const $ = (id) => document.getElementById(id);
+const percent = (value) => `${Math.round(value * 100)} %`;
+const fixed = (value) => value.toFixed(2);
+
+/** What each panel of the page shows; `id` is its <figure>. */
+const PANELS = [
+  { id: 'success', format: percent, range: [0, 1], lines: [['success', 'success']] },
+  { id: 'return', format: compact, lines: [['evaluation', 'return'], ['training', 'trainingReturn', true]] },
+  { id: 'accuracy', format: percent, range: [0.5, 1], lines: [['agrees with the answers', 'accuracy']] },
+  { id: 'correlation', format: fixed, range: [0, 1], lines: [['correlation', 'correlation']] },
+  { id: 'gap', format: fixed, lines: [['chosen', 'gapChosen'], ['pool', 'gapPool', true]] },
+  { id: 'disagreement', format: fixed, lines: [['chosen', 'disagreementChosen'], ['pool', 'disagreementPool', true]] },
+  { id: 'labels', format: compact, lines: [['answers', 'labels']] },
+  { id: 'speed', format: compact, lines: [['steps a second', 'speed']] },
+];
+
+let curves = emptyCurves();
+let isDrawing = false;
+
+async function start() {
+  const recorded = await request('GET', `/api/v1/runs/${run}/metrics`).catch(() => []);
+  for (const event of recorded) addEvent(curves, event);
+  draw();
+  listen();
+  setInterval(tellState, 5_000);
+}
+
+function draw() {
+  isDrawing = false;
+  const xMax = Number(page.dataset.totalSteps) || curves.total_steps;
+  for (const panel of PANELS) {
+    const series = panel.lines.map(([name, key, isQuiet]) => ({ name, points: curves[key], isQuiet }));
+    const [first] = series;
+    const figure = $(`curve-${panel.id}`);
+    const isEmpty = series.every((line) => line.points.length === 0);
+    figure.toggleAttribute('data-empty', isEmpty);
+    const now = first.points.at(-1);
+    figure.querySelector('[data-show="now"]').textContent = now ? panel.format(now.y) : '–';
+    if (isEmpty) continue;
+    if (panel.id === 'success') setText('success-now', percent(now.y));
+    drawCurve(figure.querySelector('svg'), { series, range: panel.range, format: panel.format, xMax, marks: curves.sessions });
+  }
+}
+
+function drawSoon() {
+  if (isDrawing) return;
+  isDrawing = true;
+  requestAnimationFrame(draw);
+}
+
+/** The server's events; the browser asks again by itself from the last one it has seen. */
+function listen() {
+  const source = new EventSource(`/api/v1/runs/${run}/events`);
+  const take = (message) => {
+    let event;
+    try {
+      event = JSON.parse(message.data);
+    } catch {
+      return;
+    }
+    const isHere = document.visibilityState === 'visible';
+    addEvent(curves, event);
+    if (isHere) drawSoon();
+    if (event.kind !== 'metrics') tellStateSoon();
+    if (['clip_stored', 'clip_ready', 'clips', 'answer_stored', 'answer', 'clip_failed'].includes(event.kind)) tellClipsSoon();
+  };
+  source.onmessage = take;
+  for (const kind of ['phase', 'metrics', 'session_offered', 'session_closed', 'evaluation', 'finished', 'failed', 'answer', 'clips', 'state']) {
+    source.addEventListener(kind, take);
+  }
+  source.onopen = () => page.removeAttribute('data-offline');
+  source.onerror = () => page.setAttribute('data-offline', '');
+  document.addEventListener('visibilitychange', drawSoon);
+}
+
+let stateTimer = 0;
+function tellStateSoon() {
+  if (stateTimer) return;
+  stateTimer = setTimeout(() => {
+    stateTimer = 0;
+    tellState();
+  }, 300);
+}
+
+async function tellState() {
+  if (document.visibilityState !== 'visible') return;
+  const now = await request('GET', `/api/v1/runs/${run}`).catch(() => null);
+  if (!now) return;
+  const { kind, message, since, next } = now.state;
+  page.dataset.state = kind;
+  setText('state-message', message);
+  setText('state-since', since ? `since ${timeOfDay(since)}` : '');
+  setText('state-next', next ?? '');
+  setText('labels-used', `${now.labels} of ${now.budget}`);
+  $('labels-bar').max = now.budget;
+  $('labels-bar').value = now.labels;
+  setText('steps-done', compact(now.step));
+  $('steps-bar').max = now.total_steps;
+  $('steps-bar').value = now.step;
+}
+
+let clipsTimer = 0;
+/** New clips are drawn by the server into the same words and pictures; this fetches that part of the page. */
+function tellClipsSoon() {
+  if (clipsTimer) return;
+  clipsTimer = setTimeout(async () => {
+    clipsTimer = 0;
+    const response = await fetch(location.pathname, { headers: { accept: 'text/html' } }).catch(() => null);
+    if (!response?.ok) return;
+    const fresh = new DOMParser().parseFromString(await response.text(), 'text/html');
+    for (const id of ['demonstrations', 'pairs', 'broken']) replaceIfChanged(id, fresh);
+  }, 1_500);
+}
+
+function replaceIfChanged(id, fresh) {
+  const [old, now] = [$(id), fresh.getElementById(id)];
+  if (!old || !now || old.dataset.version === now.dataset.version) return;
+  old.replaceWith(document.adoptNode(now));
+}
+
+function setText(id, text) {
+  if ($(id).textContent !== text) $(id).textContent = text;
+}
+
+start();
