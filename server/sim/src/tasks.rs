@@ -1,0 +1,88 @@
+//! The list of tasks: one line here and one file beside it make a task.
+
+use domain::environment::{EnvSpec, Environment};
+use domain::scene::{Frame, Scene};
+
+pub mod go_fetch_return;
+
+/// A task as the rest of the program knows it.
+#[derive(Debug)]
+pub struct Task {
+    /// As users type it: `go-fetch-return`.
+    pub name: &'static str,
+    /// As people read it: `Go, fetch, return`.
+    pub title: &'static str,
+    /// What the agent should learn, in one sentence.
+    pub summary: &'static str,
+    /// Sizes and names.
+    pub spec: fn() -> EnvSpec,
+    /// A simulation of its own, to be reset before its first step.
+    pub make: fn() -> Box<dyn Environment>,
+    /// Everything in its picture that does not move.
+    pub scene: fn() -> Scene,
+    /// Where each body of [`Task::scene`] is in a recorded pose, `[pose_size]` → `[n_bodies]`.
+    /// Needs no physics, so a pose can be drawn long after its episode.
+    pub place: fn(pose: &[f32]) -> Frame,
+    /// A scripted policy without memory, `[S]` → `[A]`.
+    pub expert: fn(observation: &[f32]) -> Vec<f32>,
+}
+
+/// Every task, in the order in which lists show them.
+pub fn tasks() -> &'static [Task] {
+    const TASKS: &[Task] = &[go_fetch_return::TASK];
+    TASKS
+}
+
+/// The task of that name.
+///
+/// # Errors
+/// [`UnknownTask`], which says what was probably meant.
+pub fn task(name: &str) -> Result<&'static Task, UnknownTask> {
+    tasks()
+        .iter()
+        .find(|task| task.name == name)
+        .ok_or_else(|| UnknownTask::new(name))
+}
+
+/// A name that no task has.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("there is no task {name:?}; did you mean {nearest:?}? The tasks are: {known}")]
+pub struct UnknownTask {
+    /// What was asked for.
+    pub name: String,
+    /// The task whose name takes the fewest changed letters.
+    pub nearest: &'static str,
+    /// All names, with commas between them.
+    pub known: String,
+}
+
+impl UnknownTask {
+    fn new(name: &str) -> Self {
+        let names = || tasks().iter().map(|task| task.name);
+        Self {
+            name: name.into(),
+            nearest: names()
+                .min_by_key(|known| edit_distance(name, known))
+                .expect("the list of tasks is not empty"),
+            known: names().collect::<Vec<_>>().join(", "),
+        }
+    }
+}
+
+/// Letters to insert, delete or change to get from `a` to `b` (Levenshtein).
+fn edit_distance(a: &str, b: &str) -> usize {
+    let mut row: Vec<usize> = (0..=b.chars().count()).collect();
+    for (i, from) in a.chars().enumerate() {
+        let mut diagonal = row[0];
+        row[0] = i + 1;
+        for (j, to) in b.chars().enumerate() {
+            let changed = diagonal + usize::from(from != to);
+            diagonal = row[j + 1];
+            row[j + 1] = changed.min(row[j] + 1).min(diagonal + 1);
+        }
+    }
+    row[row.len() - 1]
+}
+
+#[cfg(test)]
+mod tests;

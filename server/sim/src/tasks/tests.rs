@@ -1,0 +1,253 @@
+use domain::environment::{EnvError, Step};
+use domain::random::{Rng, Stream};
+
+use super::*;
+use crate::expert::rollout;
+
+/// Random actions of a stream of their own.
+fn random_policy(task: &Task, seed: u64) -> impl FnMut(&[f32]) -> Vec<f32> + use<> {
+    let mut rng = Rng::new(seed, Stream::Test, 0);
+    let size = (task.spec)().action_size;
+    move |_| {
+        (0..size)
+            .map(|_| rng.uniform_in(-1.0, 1.0) as f32)
+            .collect()
+    }
+}
+
+fn is_same(a: &Step, b: &Step) -> bool {
+    let bits = |step: &Step| {
+        step.observation
+            .iter()
+            .map(|x| x.to_bits())
+            .collect::<Vec<_>>()
+    };
+    bits(a) == bits(b)
+        && a.task_reward.0.to_bits() == b.task_reward.0.to_bits()
+        && (a.success, a.end, a.stage) == (b.success, b.end, b.stage)
+}
+
+fn assert_is_sound(task: &Task, spec: &EnvSpec, step: &Step) {
+    let name = task.name;
+    assert_eq!(step.observation.len(), spec.observation_size, "{name}");
+    assert!(step.observation.iter().all(|x| x.is_finite()), "{name}");
+    assert!(
+        (0.0..=10.0).contains(&step.task_reward.0),
+        "{name}: {step:?}"
+    );
+    let n_stages = (!spec.stages.is_empty()).then_some(spec.stages.len());
+    assert_eq!(step.stage.is_some(), n_stages.is_some(), "{name}");
+    assert!(
+        step.stage
+            .is_none_or(|stage| usize::from(stage) < spec.stages.len()),
+        "{name}"
+    );
+}
+
+#[test]
+fn every_task_resets_and_plays_an_episode_of_its_length() {
+    for task in tasks() {
+        let mut environment = (task.make)();
+        let spec = (task.spec)();
+        assert_eq!(environment.spec(), &spec);
+        assert_eq!(spec.task, task.name);
+        assert!((10..=spec.episode_len).contains(&spec.segment_len));
+        assert_eq!(environment.reset(3).len(), spec.observation_size);
+        let mut policy = random_policy(task, 1);
+        for index in 1..=spec.episode_len {
+            let step = environment.step(&policy(&[])).expect("a valid action");
+            assert_is_sound(task, &spec, &step);
+            assert_eq!(step.stage, environment.stage());
+            assert_eq!(
+                step.end.is_some(),
+                index == spec.episode_len,
+                "{}",
+                task.name
+            );
+        }
+    }
+}
+
+#[test]
+fn every_task_gives_the_same_episode_for_the_same_seed_and_another_for_another() {
+    for task in tasks() {
+        let mut fresh = (task.make)();
+        let mut used = (task.make)();
+        rollout(used.as_mut(), 9, &mut random_policy(task, 2)).expect("an episode");
+        let play = |environment: &mut dyn Environment, seed| {
+            rollout(environment, seed, &mut random_policy(task, 4)).expect("an episode")
+        };
+        let first = play(fresh.as_mut(), 5);
+        assert_eq!(first, play(used.as_mut(), 5), "{}", task.name);
+        assert_ne!(
+            first.poses[0],
+            play(used.as_mut(), 6).poses[0],
+            "{}",
+            task.name
+        );
+    }
+}
+
+#[test]
+fn every_task_goes_on_bit_for_bit_from_a_snapshot() {
+    for task in tasks() {
+        let mut original = (task.make)();
+        let mut observation = original.reset(11);
+        // The expert reaches contacts, which are the hard part of a snapshot.
+        for _ in 0..original.spec().episode_len / 3 {
+            observation = original
+                .step(&(task.expert)(&observation))
+                .expect("valid")
+                .observation;
+        }
+        let snapshot = original.snapshot();
+        let mut copy = (task.make)();
+        copy.reset(12);
+        copy.restore(&snapshot).expect("its own snapshot");
+        assert_eq!(original.pose(), copy.pose(), "{}", task.name);
+        for index in 0..original.spec().episode_len / 3 {
+            let action = (task.expert)(&observation);
+            let a = original.step(&action).expect("valid");
+            let b = copy.step(&action).expect("valid");
+            assert!(is_same(&a, &b), "{} differs at step {index}", task.name);
+            observation = a.observation;
+        }
+        assert_eq!(original.snapshot(), copy.snapshot(), "{}", task.name);
+    }
+}
+
+#[test]
+fn every_task_refuses_a_snapshot_that_is_none_and_stays_as_it_was() {
+    for task in tasks() {
+        let mut environment = (task.make)();
+        environment.reset(1);
+        let before = environment.snapshot();
+        let half = &before[..before.len() / 2];
+        for bytes in [&[][..], b"nonsense", half] {
+            let error = environment.restore(bytes).expect_err("no snapshot");
+            assert!(matches!(error, EnvError::Snapshot { .. }), "{error}");
+            assert_eq!(environment.snapshot(), before);
+        }
+    }
+}
+
+#[test]
+fn every_task_stays_finite_and_in_range_under_random_and_violent_actions() {
+    for task in tasks() {
+        let spec = (task.spec)();
+        let mut environment = (task.make)();
+        let mut rng = Rng::new(21, Stream::Test, 0);
+        for episode in 0..100_000 / u64::from(spec.episode_len) / tasks().len() as u64 {
+            environment.reset(episode);
+            // Uniform, full speed either way anew at each step, and full speed kept for long.
+            let n_kept = [1, 1, 40][episode as usize % 3];
+            let mut action = vec![0.0; spec.action_size];
+            for index in 0..spec.episode_len {
+                if index % n_kept == 0 {
+                    for value in &mut action {
+                        let drawn = rng.uniform_in(-1.0, 1.0) as f32;
+                        *value = if episode % 3 == 0 {
+                            drawn
+                        } else {
+                            drawn.signum()
+                        };
+                    }
+                }
+                let step = environment.step(&action).expect("finite");
+                assert_is_sound(task, &spec, &step);
+            }
+        }
+    }
+}
+
+#[test]
+fn every_task_clamps_large_actions_and_refuses_wrong_ones_without_moving() {
+    for task in tasks() {
+        let spec = (task.spec)();
+        let (mut environment, mut clamped) = ((task.make)(), (task.make)());
+        environment.reset(2);
+        clamped.reset(2);
+        let before = environment.snapshot();
+        assert!(matches!(
+            environment.step(&vec![0.0; spec.action_size + 1]),
+            Err(EnvError::ActionSize { expected, .. }) if expected == spec.action_size
+        ));
+        for bad in [f32::NAN, f32::INFINITY] {
+            let mut action = vec![0.0; spec.action_size];
+            action[1] = bad;
+            assert!(matches!(
+                environment.step(&action),
+                Err(EnvError::ActionNotFinite { index: 1, .. })
+            ));
+        }
+        assert_eq!(environment.snapshot(), before, "{}", task.name);
+        let large = environment
+            .step(&vec![1e30; spec.action_size])
+            .expect("clamped");
+        let one = clamped.step(&vec![1.0; spec.action_size]).expect("valid");
+        assert!(is_same(&large, &one), "{}", task.name);
+    }
+}
+
+#[test]
+fn every_pose_puts_every_body_of_the_scene_in_its_place() {
+    for task in tasks() {
+        let (scene, spec) = ((task.scene)(), (task.spec)());
+        assert!(!scene.cameras.is_empty());
+        assert!(scene.shapes.iter().all(|shape| shape.body < scene.n_bodies));
+        let mut environment = (task.make)();
+        let episode = rollout(environment.as_mut(), 3, &mut |o| (task.expert)(o)).expect("valid");
+        for pose in &episode.poses {
+            assert_eq!(pose.len(), spec.pose_size, "{}", task.name);
+            let frame = (task.place)(pose);
+            assert_eq!(frame.len(), scene.n_bodies, "{}", task.name);
+            for body in &frame {
+                let length = body.rotation.iter().map(|x| x * x).sum::<f32>();
+                assert!((length - 1.0).abs() < 1e-4, "{}: {body:?}", task.name);
+                assert!(body.position.iter().all(|x| x.is_finite()));
+            }
+        }
+        let (first, last) = (&episode.poses[0], &episode.poses[episode.poses.len() - 1]);
+        assert_ne!((task.place)(first), (task.place)(last), "{}", task.name);
+    }
+}
+
+#[test]
+fn every_expert_earns_more_than_a_random_policy() {
+    for task in tasks() {
+        let mut environment = (task.make)();
+        let mut mean_return = |policy: &mut dyn FnMut(&[f32]) -> Vec<f32>| {
+            (0..5)
+                .map(|seed| {
+                    rollout(environment.as_mut(), seed, policy)
+                        .expect("valid")
+                        .task_return
+                })
+                .sum::<f64>()
+        };
+        let expert = mean_return(&mut |o| (task.expert)(o));
+        let random = mean_return(&mut random_policy(task, 1));
+        assert!(
+            expert > 2.0 * random,
+            "{}: {expert} against {random}",
+            task.name
+        );
+    }
+}
+
+#[test]
+fn task_names_differ_and_lead_to_their_tasks() {
+    for (index, one) in tasks().iter().enumerate() {
+        assert_eq!(task(one.name).expect("a listed name").title, one.title);
+        assert!(tasks()[..index].iter().all(|other| other.name != one.name));
+    }
+}
+
+#[test]
+fn an_unknown_task_is_answered_with_the_nearest_one_and_the_list() {
+    let error = task("go-fetch-retrun").expect_err("misspelled");
+    assert_eq!(error.nearest, "go-fetch-return");
+    for known in tasks() {
+        assert!(error.to_string().contains(known.name), "{error}");
+    }
+}
