@@ -299,7 +299,10 @@ function listen() {
   document.addEventListener('keydown', keyPressed);
   player.addEventListener('firstframe', firstFrameIsOn);
   page.addEventListener('click', clicked);
-  ready.addEventListener('state', ({ detail }) => tellProgress(detail));
+  ready.addEventListener('state', ({ detail }) => {
+    outbox.wake();
+    tellProgress(detail);
+  });
   ready.addEventListener('ready', () => { if (!current) proceedIfReady(); });
   ready.addEventListener('broken', ({ detail }) => skipBroken(detail));
   ready.addEventListener('offline', () => offline());

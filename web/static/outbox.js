@@ -8,7 +8,7 @@ import { Problem, request } from './api.js';
 /** Answered pairs that can be gone back to. */
 export const HISTORY = 50;
 const FIRST_RETRY_MS = 500;
-const LAST_RETRY_MS = 10_000;
+const LAST_RETRY_MS = 5_000;
 
 /**
  * @typedef {object} Answered one answered pair: `{lease_id, run, lease, answer, answer_id, at}`;
@@ -63,6 +63,13 @@ export class Outbox extends EventTarget {
         transaction.objectStore('unsent').add({ lease_id: lease.lease_id, body, isChange: true });
       };
     });
+    this.#sendSoon(0);
+  }
+
+  /** The server was heard of: what waits for a connection need wait no longer. */
+  wake() {
+    if (this.#retryMs === FIRST_RETRY_MS) return;
+    this.#retryMs = FIRST_RETRY_MS;
     this.#sendSoon(0);
   }
 
