@@ -1,0 +1,344 @@
+//! Sawyer's hand as MetaWorld's tasks feel it: a body that follows a target, and two fingers.
+//!
+//! The arm itself is not simulated; pictures find its joints by inverse kinematics. Each
+//! control step moves the target by at most 1 cm per axis; the hand follows it about four
+//! steps behind, as a mass on a damped spring of 8180 N/m.
+//!
+//! Differs from the original: the hand never tilts (there up to 4° in free motion, 2.3° per N·m), one gain
+//! serves all directions, and the fingers do not feel what they touch.
+//! Source: METAWORLD.md 1.1, 1.5, 1.6.
+
+use domain::scene::{Geometry, Material, Shape, Transform};
+use rapier3d::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use super::sawyer_fingers::Fingers;
+use super::tabletop::{self, Layer};
+use crate::tasks::metaworld::{self, Point, plus};
+
+/// Metres that a full action moves the target in one control step.
+const ACTION_SCALE_M: f64 = 0.01;
+/// Pull towards the target, s⁻², and drag, s⁻¹, both held for one control step.
+/// Fitted to the step response in METAWORLD.md 1.6 (0.5 mm rms of 100 mm).
+const PULL: f64 = 900.0;
+const DRAG: f64 = 55.0;
+/// What the hand yields to a steady force (0.122 mm/N).
+const STIFFNESS_N_PER_M: f64 = 8180.0;
+/// The mass that gives this stiffness with this pull.
+const MASS_KG: f64 = STIFFNESS_N_PER_M / PULL;
+/// The arm's weight pulls the hand this far below its target.
+const SAG: Point = [0.0, 0.0, -0.0038];
+/// After a reset the hand settles with this time constant, in control steps.
+const SETTLING_STEPS: f64 = 20.0;
+/// From here on the arm is stretched: of every metre further out the hand follows a third.
+const REACH_M: f64 = 0.89;
+const STRETCH: f64 = 0.35;
+const SHOULDER: Point = [0.0, 0.0, 0.317];
+
+/// Where a task's hand starts and may go.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct HandRange {
+    /// Target at reset, metres.
+    pub home: Point,
+    /// The hand at reset minus the target: the arm has not settled yet, metres.
+    pub unsettled: Point,
+    /// Least target, metres.
+    pub lower: Point,
+    /// Greatest target, metres.
+    pub upper: Point,
+}
+
+impl HandRange {
+    /// Near the robot, above the table: window-open, window-close.
+    pub const NEAR: Self = Self {
+        home: [0.0, 0.4, 0.2],
+        unsettled: [0.005_91, -0.000_30, -0.005_02],
+        lower: [-0.5, 0.40, 0.05],
+        upper: [0.5, 1.0, 0.5],
+    };
+}
+
+/// The hand of one episode; its body lives in the world it was built into.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct SawyerHand {
+    body: RigidBodyHandle,
+    /// Right, left.
+    finger_colliders: [ColliderHandle; 2],
+    fingers: Fingers,
+    range: HandRange,
+    target: Point,
+    n_steps: u32,
+}
+
+impl SawyerHand {
+    /// Puts a hand at its home, with open fingers and not yet settled.
+    pub fn new(world: &mut PhysicsWorld, range: HandRange) -> Self {
+        let start = plus(range.home, range.unsettled);
+        let body = RigidBodyBuilder::dynamic()
+            .translation(vector(start))
+            .lock_rotations()
+            .additional_mass(MASS_KG as f32)
+            .can_sleep(false);
+        let body = world.insert_body(body);
+        let palm = ColliderBuilder::cuboid(0.033, 0.053, 0.027);
+        let palm = tabletop::collider(palm, [-0.009, 0.0, 0.066], Layer::Hand).density(0.0);
+        world.insert_collider(palm, Some(body));
+        let fingers = Fingers::open();
+        let finger_colliders = finger_centres(&fingers).map(|centre| {
+            let finger = ColliderBuilder::cuboid(0.015, 0.0045, 0.045);
+            let finger = tabletop::collider(finger, centre, Layer::Hand)
+                .density(0.0)
+                .friction(2.0);
+            world.insert_collider(finger, Some(body))
+        });
+        Self {
+            body,
+            finger_colliders,
+            fingers,
+            range,
+            target: range.home,
+            n_steps: 0,
+        }
+    }
+
+    /// Takes an action in [−1, 1]⁴ (three increments of the target, the gripper command) and
+    /// sets the forces of the coming control step; the caller then steps the world.
+    pub fn drive(&mut self, world: &mut PhysicsWorld, action: [f64; 4]) {
+        let HandRange { lower, upper, .. } = self.range;
+        self.target = std::array::from_fn(|i| {
+            (self.target[i] + ACTION_SCALE_M * action[i]).clamp(lower[i], upper[i])
+        });
+        self.fingers.advance(action[3]);
+        for (handle, centre) in self
+            .finger_colliders
+            .iter()
+            .zip(finger_centres(&self.fingers))
+        {
+            world.colliders[*handle]
+                .set_position_wrt_parent(Pose::from_translation(Vector::from(centre)));
+        }
+
+        let rest = self.rest();
+        self.n_steps += 1;
+        let body = &mut world.bodies[self.body];
+        let force = (vector(rest) - body.translation()) * (PULL * MASS_KG) as f32
+            - body.linvel() * (DRAG * MASS_KG) as f32;
+        body.reset_forces(true);
+        body.add_force(force, true);
+    }
+
+    /// Where the hand would come to rest, untouched.
+    fn rest(&self) -> Point {
+        let left = (-f64::from(self.n_steps) / SETTLING_STEPS).exp();
+        let reached = within_reach(self.target);
+        std::array::from_fn(|i| reached[i] + SAG[i] + left * (self.range.unsettled[i] - SAG[i]))
+    }
+
+    /// Origin of the hand's frame, between the fingers' mountings; metres.
+    pub fn position(&self, world: &PhysicsWorld) -> Point {
+        let p = world.bodies[self.body].translation();
+        [f64::from(p.x), f64::from(p.y), f64::from(p.z)]
+    }
+
+    /// The point between the fingertips; metres.
+    pub fn fingertips(&self, world: &PhysicsWorld) -> Point {
+        let between = f64::midpoint(self.fingers.right(), self.fingers.left());
+        plus(self.position(world), [0.0, between, -0.045])
+    }
+
+    /// 1 open, 0.2967 closed on nothing.
+    pub fn openness(&self) -> f64 {
+        let right = [0.0, -0.05 + self.fingers.right(), 0.0];
+        let left = [0.0, 0.05 + self.fingers.left(), 0.0];
+        metaworld::openness(left, right)
+    }
+
+    /// Both fingers.
+    pub fn fingers(&self) -> &Fingers {
+        &self.fingers
+    }
+}
+
+/// Draws a target that the arm cannot reach closer to the shoulder.
+fn within_reach(target: Point) -> Point {
+    let out: Point = std::array::from_fn(|i| target[i] - SHOULDER[i]);
+    let distance = metaworld::distance(target, SHOULDER);
+    if distance <= REACH_M {
+        return target;
+    }
+    let scale = (REACH_M + STRETCH * (distance - REACH_M)) / distance;
+    std::array::from_fn(|i| SHOULDER[i] + scale * out[i])
+}
+
+/// Centres of the right and the left finger's box in the hand's frame (world axes), metres.
+fn finger_centres(fingers: &Fingers) -> [[f32; 3]; 2] {
+    [
+        [0.0, (-0.0485 + fingers.right()) as f32, 0.0],
+        [0.0, (0.0485 + fingers.left()) as f32, 0.0],
+    ]
+}
+
+fn vector(p: Point) -> Vector {
+    Vector::new(p[0] as f32, p[1] as f32, p[2] as f32)
+}
+
+/// Bodies that [`place`] gives and [`shapes`] uses: the world, the hand, both fingers.
+pub const N_BODIES: usize = 4;
+/// The hand's body in a scene.
+pub const HAND_BODY: usize = 1;
+/// Numbers of a pose that belong to the hand: its position, the right and the left finger.
+pub const POSE_SIZE: usize = 5;
+
+/// The hand's part of a pose.
+pub fn pose(hand: &SawyerHand, world: &PhysicsWorld) -> [f32; POSE_SIZE] {
+    let [x, y, z] = hand.position(world);
+    [x, y, z, hand.fingers.right(), hand.fingers.left()].map(|v| v as f32)
+}
+
+/// The world, the hand (its x axis down, as the arm holds it) and the fingers of a pose.
+pub fn place(pose: &[f32]) -> [Transform; N_BODIES] {
+    let (x, y, z) = (pose[0], pose[1], pose[2]);
+    let hand = Transform::at(x, y, z).turned([0.0, 1.0, 0.0], std::f32::consts::FRAC_PI_2);
+    [
+        Transform::IDENTITY,
+        hand,
+        Transform::at(x, y - 0.0485 + pose[3], z),
+        Transform::at(x, y + 0.0485 + pose[4], z),
+    ]
+}
+
+/// Palm, rail, the white right and the cyan left finger, red fingertips.
+pub fn shapes() -> Vec<Shape> {
+    let upright = Transform::IDENTITY.turned([0.0, 1.0, 0.0], -std::f32::consts::FRAC_PI_2);
+    let cuboid = |body, local, half, material| Shape {
+        body,
+        local,
+        geometry: Geometry::Cuboid { half },
+        material,
+    };
+    let palm = upright.then(Transform::at(-0.009, 0.0, 0.066));
+    let rail = upright.then(Transform::at(0.0, 0.0, 0.05));
+    let mut shapes = vec![
+        cuboid(
+            HAND_BODY,
+            palm,
+            [0.033, 0.053, 0.027],
+            Material::plain(0.5, 0.1, 0.1),
+        ),
+        cuboid(
+            HAND_BODY,
+            rail,
+            [0.005, 0.055, 0.005],
+            Material::plain(0.5, 0.5, 0.5),
+        ),
+    ];
+    let colors = [
+        Material::plain(0.95, 0.95, 0.95),
+        Material::plain(0.0, 0.85, 0.85),
+    ];
+    for (body, material) in (2..).zip(colors) {
+        let half = [0.015, 0.0045, 0.045];
+        shapes.push(cuboid(body, Transform::IDENTITY, half, material));
+        shapes.push(Shape {
+            body,
+            local: Transform::at(0.0, 0.0, -0.045),
+            geometry: Geometry::Sphere { radius: 0.01 },
+            material: Material::plain(0.85, 0.1, 0.1),
+        });
+    }
+    shapes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ACROSS: HandRange = HandRange {
+        home: [0.0, 0.6, 0.2],
+        ..HandRange::NEAR
+    };
+
+    fn settled() -> (PhysicsWorld, SawyerHand) {
+        let mut world = tabletop::world().physics;
+        let mut hand = SawyerHand::new(&mut world, ACROSS);
+        advance(&mut world, &mut hand, [0.0; 4], 150);
+        (world, hand)
+    }
+
+    fn advance(world: &mut PhysicsWorld, hand: &mut SawyerHand, action: [f64; 4], n: usize) {
+        for _ in 0..n {
+            hand.drive(world, action);
+            world.step();
+        }
+    }
+
+    /// METAWORLD.md 1.6, v2: mm after each control step, ten of full action, then none.
+    const STEP_RESPONSE_MM: [f64; 20] = [
+        0.65, 2.9, 6.9, 12.4, 19.2, 26.9, 35.3, 44.2, 53.5, 62.9, 71.8, 79.2, 84.9, 89.1, 92.1,
+        94.1, 95.4, 96.3, 96.9, 97.3,
+    ];
+
+    #[test]
+    fn a_settled_hand_follows_ten_full_steps_as_recorded() {
+        for (axis, sign) in [
+            (0, 1.0),
+            (0, -1.0),
+            (1, 1.0),
+            (1, -1.0),
+            (2, 1.0),
+            (2, -1.0),
+        ] {
+            let (mut world, mut hand) = settled();
+            let start = hand.position(&world)[axis];
+            let mut squares = 0.0;
+            for (t, reference) in STEP_RESPONSE_MM.iter().enumerate() {
+                let mut action = [0.0; 4];
+                action[axis] = if t < 10 { sign } else { 0.0 };
+                advance(&mut world, &mut hand, action, 1);
+                let moved_mm = sign * (hand.position(&world)[axis] - start) * 1000.0;
+                squares += (moved_mm - reference).powi(2);
+            }
+            let rms = (squares / 20.0).sqrt();
+            assert!(rms < 1.0, "axis {axis}, sign {sign}: {rms} mm rms");
+        }
+    }
+
+    #[test]
+    fn a_hand_left_alone_settles_just_below_its_target() {
+        let (world, hand) = settled();
+        let off = metaworld::distance(hand.position(&world), [0.0, 0.6, 0.1962]);
+        assert!(off < 0.0003, "{off} m");
+    }
+
+    #[test]
+    fn a_target_beyond_the_arm_only_stretches_it() {
+        let reached = within_reach([0.0, 0.9, 0.2]);
+        assert!((reached[1] - 0.886).abs() < 0.005, "{reached:?}");
+        let reached = within_reach([0.25, 1.0, 0.2]);
+        assert!((reached[0] - 0.226).abs() < 0.005 && (reached[1] - 0.905).abs() < 0.01);
+        let near = [0.0, 0.8, 0.2];
+        assert!(metaworld::distance(within_reach(near), near) < 1e-12);
+    }
+
+    #[test]
+    fn a_steady_push_of_100_newtons_moves_the_hand_by_12_millimetres() {
+        let (mut world, mut hand) = settled();
+        let start = hand.position(&world)[1];
+        for _ in 0..100 {
+            hand.drive(&mut world, [0.0; 4]);
+            world.bodies[hand.body].add_force(Vector::new(0.0, 100.0, 0.0), true);
+            world.step();
+        }
+        let moved_mm = (hand.position(&world)[1] - start) * 1000.0;
+        assert!((moved_mm - 12.2).abs() < 0.3, "{moved_mm} mm");
+    }
+
+    #[test]
+    fn the_hand_frame_points_down_and_the_palm_sits_above_the_fingers() {
+        let placed = place(&[0.1, 0.5, 0.2, 0.04, -0.03]);
+        let palm = placed[HAND_BODY].then(shapes()[0].local);
+        assert!((palm.position[2] - 0.266).abs() < 1e-6, "{palm:?}");
+        assert!((placed[2].position[1] - 0.4915).abs() < 1e-6);
+        assert!((placed[3].position[1] - 0.5185).abs() < 1e-6);
+    }
+}

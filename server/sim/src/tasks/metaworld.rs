@@ -1,0 +1,210 @@
+//! What all MetaWorld tasks share: the 39 numbers of an observation, the course of an episode,
+//! an expert's action, distances.
+//!
+//! Observations and judgements are functions of plain values: the environments call them with
+//! what the physics says, `golden` with what the original environment recorded.
+
+use domain::environment::{EnvError, EnvSpec, EpisodeEnd, Step, TaskReward, checked_action};
+use serde::{Deserialize, Serialize};
+
+use crate::robots::sawyer_hand::{HandRange, SawyerHand};
+use crate::robots::tabletop;
+use crate::world::World;
+
+/// Metres; x right, y away from the robot, z up.
+pub type Point = [f64; 3];
+
+/// Numbers in an observation.
+pub const OBSERVATION_SIZE: usize = 39;
+/// Numbers that describe one moment; an observation holds two of them and the goal.
+pub const MOMENT_SIZE: usize = 18;
+/// Control steps in an episode.
+pub const EPISODE_LEN: u32 = 500;
+/// Seconds in a control step.
+pub const CONTROL_PERIOD_S: f64 = 0.0125;
+/// Steps in a segment shown to people.
+pub const SEGMENT_LEN: u32 = 50;
+
+/// One moment as an observation shows it.
+///
+/// | index | meaning | unit |
+/// |---|---|---|
+/// | 0–2 | hand | m |
+/// | 3 | gripper openness, 1 open, 0.2967 closed on nothing | – |
+/// | 4–6 | the task's point on its object | m |
+/// | 7–10 | the object's quaternion, its order up to the task; zeros where there is none | – |
+/// | 11–17 | a second object; always zeros in these tasks | – |
+pub fn moment(
+    hand: Point,
+    openness: f64,
+    object: Point,
+    quaternion: [f64; 4],
+) -> [f64; MOMENT_SIZE] {
+    let mut moment = [0.0; MOMENT_SIZE];
+    moment[..3].copy_from_slice(&hand);
+    moment[3] = openness;
+    moment[4..7].copy_from_slice(&object);
+    moment[7..11].copy_from_slice(&quaternion);
+    moment
+}
+
+/// An observation: the moment (0–17), the moment one step before (18–35) and the goal
+/// (36–38), which stays hidden and therefore zero.
+///
+/// After a reset there is no step before: pass the same moment twice.
+pub fn observation(
+    now: &[f64; MOMENT_SIZE],
+    before: &[f64; MOMENT_SIZE],
+) -> [f64; OBSERVATION_SIZE] {
+    let mut observation = [0.0; OBSERVATION_SIZE];
+    observation[..MOMENT_SIZE].copy_from_slice(now);
+    observation[MOMENT_SIZE..2 * MOMENT_SIZE].copy_from_slice(before);
+    observation
+}
+
+/// How far open the gripper is: the distance of the fingers over 0.1 m, in [0, 1].
+pub fn openness(left: Point, right: Point) -> f64 {
+    (distance(left, right) / 0.1).clamp(0.0, 1.0)
+}
+
+/// Metres.
+pub fn distance(a: Point, b: Point) -> f64 {
+    a.iter()
+        .zip(b)
+        .map(|(a, b)| (a - b) * (a - b))
+        .sum::<f64>()
+        .sqrt()
+}
+
+/// Component by component.
+pub fn plus(a: Point, b: Point) -> Point {
+    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
+}
+
+/// Metres in the plane of the table.
+pub fn distance_xy(a: Point, b: Point) -> f64 {
+    (a[0] - b[0]).hypot(a[1] - b[1])
+}
+
+/// A scripted expert's action: towards a waypoint, as fast as `gain` says, with the gripper
+/// at `grip` (+1 closes, −1 opens).
+pub fn towards(hand: Point, waypoint: Point, gain: f64, grip: f64) -> Vec<f32> {
+    (0..3)
+        .map(|i| (gain * (waypoint[i] - hand[i])).clamp(-1.0, 1.0) as f32)
+        .chain([grip as f32])
+        .collect()
+}
+
+/// Ground truth about one step, with the parts of the reward that MetaWorld reports beside it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Judgement {
+    /// In [0, 10].
+    pub reward: f64,
+    /// Whether the task counts as solved at this step.
+    pub success: bool,
+    /// Whether the hand is at the object.
+    pub near_object: bool,
+    /// How well the hand is placed, in [0, 1].
+    pub grasp_reward: f64,
+    /// How well the object is placed, in [0, 1].
+    pub in_place_reward: f64,
+    /// Metres from the object to its goal.
+    pub obj_to_target: f64,
+}
+
+/// What every MetaWorld episode holds: a world on the table, the hand in it, the moment before.
+#[derive(Serialize, Deserialize)]
+pub struct Episode {
+    /// The physics.
+    pub world: World,
+    /// The robot.
+    pub hand: SawyerHand,
+    /// Where the fingertips were at the reset, metres.
+    pub init_tcp: Point,
+    seed: u64,
+    n_steps: u32,
+    before: [f64; MOMENT_SIZE],
+}
+
+impl Episode {
+    /// The table with a hand at its home; the task adds its object and then calls
+    /// [`Episode::first_observation`].
+    pub fn new(seed: u64, range: HandRange) -> Self {
+        let mut world = tabletop::world();
+        tabletop::add_table(&mut world.physics);
+        let hand = SawyerHand::new(&mut world.physics, range);
+        Self {
+            init_tcp: hand.fingertips(&world.physics),
+            world,
+            hand,
+            seed,
+            n_steps: 0,
+            before: [0.0; MOMENT_SIZE],
+        }
+    }
+
+    /// The observation after a reset: both halves show the same moment.
+    pub fn first_observation(&mut self, now: [f64; MOMENT_SIZE]) -> Vec<f32> {
+        self.before = now;
+        self.observe(now)
+    }
+
+    /// Moves target, fingers and physics by one control step.
+    ///
+    /// # Errors
+    /// Actions that do not fit leave the state unchanged; a world that left the finite numbers
+    /// says so.
+    pub fn advance(&mut self, task: &str, action: &[f32]) -> Result<(), EnvError> {
+        let action = checked_action::<4>(task, action)?;
+        self.hand.drive(&mut self.world.physics, action);
+        self.n_steps += 1;
+        let position_is_finite = |episode: &Self| {
+            let position = episode.hand.position(&episode.world.physics);
+            position.iter().all(|x| x.is_finite())
+        };
+        if self.world.step() && position_is_finite(self) {
+            return Ok(());
+        }
+        Err(EnvError::NotFinite {
+            task: task.into(),
+            seed: self.seed,
+            step: self.n_steps,
+        })
+    }
+
+    /// What the step brought, given the moment after it.
+    pub fn finish_step(&mut self, now: [f64; MOMENT_SIZE], judgement: Judgement) -> Step {
+        Step {
+            observation: self.observe(now),
+            task_reward: TaskReward(judgement.reward),
+            success: judgement.success,
+            end: (self.n_steps >= EPISODE_LEN).then_some(EpisodeEnd::TimeLimit),
+            stage: None,
+        }
+    }
+
+    fn observe(&mut self, now: [f64; MOMENT_SIZE]) -> Vec<f32> {
+        let observation = observation(&now, &self.before);
+        self.before = now;
+        observation.iter().map(|x| *x as f32).collect()
+    }
+}
+
+/// Sizes and names of a MetaWorld task.
+pub fn spec(task: &str, pose_size: usize) -> EnvSpec {
+    EnvSpec {
+        task: task.into(),
+        observation_size: OBSERVATION_SIZE,
+        action_size: 4,
+        pose_size,
+        episode_len: EPISODE_LEN,
+        segment_len: SEGMENT_LEN,
+        control_period_s: CONTROL_PERIOD_S,
+        stages: Vec::new(),
+    }
+}
+
+/// Three numbers of an observation as a point.
+pub fn point(observation: &[f32], start: usize) -> Point {
+    std::array::from_fn(|i| f64::from(observation[start + i]))
+}
