@@ -5,7 +5,7 @@
 //!
 //! # Geometry
 //! A floor of [−1.2, 1.2]² inside low walls. The robot is a disc of radius 0.16 that drives in
-//! any direction at up to 0.7 m/s (lag 0.1 s) and turns its nose to where it is told to go; its
+//! any direction at up to 0.6 m/s (lag 0.1 s) and turns its nose to where it is told to go; its
 //! body pushes what it touches. p is its centre, n its nose (a unit vector) and
 //! **j = p + 0.24 n** the point between its jaws. The object, a disc of radius 0.06, is at b; it
 //! slides and comes to rest by itself. The goal, at g, is a mark on the floor of radius
@@ -27,7 +27,7 @@
 //! | index | content | unit |
 //! |---|---|---|
 //! | 0–1 | p | 1.2 m |
-//! | 2–3 | velocity of the robot | 0.7 m/s |
+//! | 2–3 | velocity of the robot | 0.6 m/s |
 //! | 4–5 | n | – |
 //! | 6 | 2 o − 1 | – |
 //! | 7 | 1 while the object is held, else −1 | – |
@@ -38,7 +38,7 @@
 //! # Action
 //! | index | content |
 //! |---|---|
-//! | 0–1 | wanted velocity in world axes; 1 is 0.7 m/s; cut to the unit disc |
+//! | 0–1 | wanted velocity in world axes; 1 is 0.6 m/s; cut to the unit disc |
 //! | 2 | jaws: +1 close, −1 open, 0 leave them |
 //!
 //! # Reward

@@ -1,22 +1,188 @@
 use super::*;
-use crate::expert::rollout;
+use crate::expert::{Rollout, rollout};
+
+type Policy<'a> = &'a mut dyn FnMut(&[f32]) -> Vec<f32>;
+
+fn play(seed: u64, policy: Policy<'_>) -> Rollout {
+    rollout(&mut GoFetchReturn::new(), seed, policy).expect("a valid action")
+}
+
+fn success_rate(policy: Policy<'_>) -> f64 {
+    let n_successes = (0..300).filter(|&seed| play(seed, policy).success).count();
+    n_successes as f64 / 300.0
+}
+
+/// A state in which nothing but these numbers matters.
+fn view(to_object: f32, openness: f32, is_held: bool, to_goal: f32) -> View {
+    View {
+        robot: PlanarState {
+            position: [0.0; 2],
+            velocity: [0.0; 2],
+            heading: [1.0, 0.0],
+            turn_rate: 0.0,
+        },
+        openness,
+        is_held,
+        jaws_to_object: [to_object, 0.0],
+        object_to_goal: [to_goal, 0.0],
+    }
+}
+
+/// An episode of the expert up to the first step at which the object is held.
+fn holding(seed: u64) -> GoFetchReturn {
+    let mut environment = GoFetchReturn::new();
+    let mut observation = environment.reset(seed);
+    while !environment.state.is_held {
+        observation = environment
+            .step(&expert(&observation))
+            .expect("a valid action")
+            .observation;
+        assert!(environment.state.n_steps < EPISODE_LEN, "never held");
+    }
+    environment
+}
 
 #[test]
-fn the_expert_nearly_always_succeeds_and_a_random_policy_nearly_never() {
-    let mut environment = GoFetchReturn::new();
-    let mut rate = |policy: &mut dyn FnMut(&[f32]) -> Vec<f32>| {
-        let successes = (0..300)
-            .filter(|&seed| {
-                rollout(&mut environment, seed, policy)
-                    .expect("a valid action")
-                    .success
-            })
-            .count();
-        successes as f64 / 300.0
-    };
-    let expert_rate = rate(&mut expert);
+fn the_expert_succeeds_and_a_random_policy_does_not() {
+    let expert_rate = success_rate(&mut expert);
     assert!(expert_rate >= 0.98, "expert: {expert_rate}");
     let mut rng = Rng::new(1, Stream::Rollout, 0);
-    let random_rate = rate(&mut |_| (0..3).map(|_| rng.uniform_in(-1.0, 1.0) as f32).collect());
+    let random_rate = success_rate(&mut |_| {
+        (0..ACTION_SIZE)
+            .map(|_| rng.uniform_in(-1.0, 1.0) as f32)
+            .collect()
+    });
     assert!(random_rate <= 0.02, "random: {random_rate}");
+}
+
+#[test]
+fn the_expert_passes_through_the_stages_in_order_and_spends_a_segment_in_each() {
+    let mut mean_steps = [0.0; STAGES.len()];
+    for seed in 0..100 {
+        let stages = play(seed, &mut expert).stages;
+        assert!(stages.is_sorted(), "seed {seed}: {stages:?}");
+        for stage in stages {
+            mean_steps[usize::from(stage)] += 0.01;
+        }
+    }
+    assert!(mean_steps.iter().all(|&n| n >= 12.0), "{mean_steps:?}");
+}
+
+#[test]
+fn the_reward_grows_along_the_experts_way() {
+    for seed in 0..50 {
+        let rewards = play(seed, &mut expert).task_rewards;
+        // Turning at the start, and the swing of the object when it is taken, may cost a little.
+        let losses: f64 = rewards.windows(2).map(|w| (w[0] - w[1]).max(0.0)).sum();
+        let gains = rewards[rewards.len() - 1] - rewards[0];
+        assert!(
+            losses < 0.15 * gains,
+            "seed {seed}: lost {losses}, won {gains}"
+        );
+        let quarters: Vec<f64> = rewards.chunks(25).map(|c| c.iter().sum()).collect();
+        assert!(quarters.is_sorted(), "seed {seed}: {quarters:?}");
+    }
+}
+
+#[test]
+fn no_state_before_a_stage_pays_as_much_as_the_worst_one_after_it() {
+    let grid = |n: u8| (0..=n).map(move |i| f32::from(i) / f32::from(n));
+    for to_goal in grid(20).map(|x| GOAL_RADIUS + 0.01 + 3.0 * x) {
+        let held = view(0.0, HELD_OPENNESS, true, to_goal).task_reward();
+        for openness in grid(20) {
+            for to_object in grid(60).map(|x| 3.0 * x) {
+                let loose = view(to_object, openness, false, to_goal).task_reward();
+                assert!(loose < held && loose.0 <= 4.0);
+                if to_object > JAW_ZONE {
+                    let between = view(0.0, 1.0, false, to_goal).task_reward();
+                    assert!(loose <= between);
+                }
+            }
+        }
+        assert!(held < view(0.0, 0.5, true, GOAL_RADIUS).task_reward());
+    }
+}
+
+#[test]
+fn the_reward_agrees_with_values_worked_out_by_hand() {
+    let reward = |v: View| v.task_reward().0;
+    // near(1) = 0.6 · (1 − 1/3.4) + 0.4 · e⁻⁵ = 0.423529 + 0.002695
+    assert!((reward(view(1.1, 1.0, false, 1.0)) - 3.0 * 0.426_225).abs() < 1e-5);
+    assert!((reward(view(1.1, 0.5, false, 1.0)) - 2.4 * 0.426_225).abs() < 1e-5);
+    assert!((reward(view(0.0, 0.45, true, 1.12)) - (5.0 + 5.0 * 0.426_225)).abs() < 1e-5);
+    assert!((reward(view(0.05, 0.725, false, 1.0)) - 3.5).abs() < 1e-5);
+    assert!((reward(view(0.05, 0.725, false, 0.1)) - 10.0).abs() < 1e-12);
+}
+
+#[test]
+fn a_held_object_comes_along_and_a_dropped_one_stays() {
+    let mut environment = holding(3);
+    let start = environment.state.view();
+    for _ in 0..10 {
+        environment.step(&[0.0, 0.0, 1.0]).expect("valid");
+    }
+    let view = environment.state.view();
+    assert!(
+        norm(view.jaws_to_object) < 0.01,
+        "{:?}",
+        view.jaws_to_object
+    );
+    let goal = start.object_to_goal;
+    let away = [-goal[0] / norm(goal), -goal[1] / norm(goal)];
+    for _ in 0..15 {
+        environment.step(&[-away[0], -away[1], 0.0]).expect("valid");
+    }
+    let carried = environment.state.view();
+    assert!(carried.is_held && norm(carried.object_to_goal) < norm(goal) - 0.2);
+    for _ in 0..15 {
+        environment.step(&[away[0], away[1], -1.0]).expect("valid");
+    }
+    let dropped = environment.state.view();
+    assert!(!dropped.is_held && norm(dropped.jaws_to_object) > 0.1);
+}
+
+#[test]
+fn jaws_that_came_closed_do_not_take_anything() {
+    let mut is_ever_held = false;
+    play(4, &mut |observation| {
+        let mut action = expert(observation);
+        action[2] = 1.0;
+        is_ever_held |= observation[7] > 0.0;
+        action
+    });
+    assert!(!is_ever_held);
+}
+
+#[test]
+fn a_robot_that_runs_against_the_walls_stays_inside() {
+    let mut environment = GoFetchReturn::new();
+    for (seed, drive) in [[1.0, 0.0], [-1.0, 0.3], [0.1, 1.0], [1.0, -1.0]]
+        .into_iter()
+        .enumerate()
+    {
+        environment.reset(seed as u64);
+        for _ in 0..EPISODE_LEN {
+            environment.step(&[drive[0], drive[1], 1.0]).expect("valid");
+        }
+        let [x, y] = environment.state.view().robot.position;
+        assert!(x.abs() < FLOOR_HALF && y.abs() < FLOOR_HALF, "{x} {y}");
+    }
+}
+
+#[test]
+fn the_observation_stays_within_a_few_units() {
+    let mut rng = Rng::new(8, Stream::Test, 0);
+    let mut largest = [0.0_f32; OBSERVATION_SIZE];
+    for seed in 0..100 {
+        let keep = rng.uniform_in(-1.0, 1.0) as f32;
+        play(seed, &mut |observation| {
+            for (largest, value) in largest.iter_mut().zip(observation) {
+                *largest = largest.max(value.abs());
+            }
+            let mut action = expert(observation);
+            action[2] *= keep;
+            action
+        });
+    }
+    assert!(largest.iter().all(|&x| x <= 2.0), "{largest:?}");
 }
