@@ -5,6 +5,8 @@
 //! steps is nobody's business but the task's, so tasks share physics but no behaviour.
 
 pub mod expert;
+pub mod golden;
+pub mod reward;
 pub mod robots;
 pub mod tasks;
 pub mod world;

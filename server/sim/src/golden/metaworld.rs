@@ -1,0 +1,431 @@
+//! MetaWorld's recordings: lines to readings, readings to checks.
+
+use std::collections::BTreeMap;
+
+use serde::de::Error;
+use serde::{Deserialize, Deserializer};
+use serde_json::{Map, Value};
+
+use super::{Checks, OBSERVATION_TOLERANCE, REWARD_TOLERANCE, TRAJECTORY_TOLERANCE};
+use crate::tasks::metaworld::{self, Judgement, MOMENT_SIZE, OBSERVATION_SIZE, Point};
+use crate::tasks::window_open;
+
+/// Turns what was recorded into what the task makes of it.
+type Rebuild = fn(&Recorded) -> Result<Rebuilt, String>;
+
+/// The tasks whose recordings can be replayed. One line here makes a task's recordings known.
+const TASKS: [(&str, Rebuild); 1] = [("window-open", rebuild_window_open)];
+
+/// Whether recordings of this task can be replayed.
+pub(super) fn knows(task: &str) -> bool {
+    TASKS.iter().any(|(name, _)| *name == task)
+}
+
+/// What a line holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    Transition,
+    Reset,
+    Trajectory,
+}
+
+impl Kind {
+    /// Told apart by the fields that only one of them has.
+    pub(super) fn of(fields: &Map<String, Value>) -> Option<Self> {
+        let has = |name| fields.contains_key(name);
+        if has("obs") && has("r") {
+            Some(Self::Transition)
+        } else if has("obs") && has("rand_vec") {
+            Some(Self::Reset)
+        } else if has("obj") && has("grip") {
+            Some(Self::Trajectory)
+        } else {
+            None
+        }
+    }
+}
+
+/// Which original a line is from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+enum Version {
+    /// MuJoCo 2.1.0. Positions are read one substep before joint values.
+    #[serde(rename = "v2")]
+    V2,
+    /// MuJoCo 3. Clips positions to the observation's bounds.
+    #[serde(rename = "v3")]
+    V3,
+}
+
+impl Version {
+    fn name(self) -> &'static str {
+        match self {
+            Self::V2 => "v2",
+            Self::V3 => "v3",
+        }
+    }
+
+    /// Seconds by which positions are older than joint values.
+    fn lag_s(self) -> f64 {
+        match self {
+            Self::V2 => 0.0025,
+            Self::V3 => 0.0,
+        }
+    }
+
+    /// The hand as this version's observation shows it.
+    fn shown(self, hand: Point) -> Point {
+        const LOWER: Point = [-0.525, 0.348, -0.0525];
+        const UPPER: Point = [0.525, 1.025, 0.7];
+        match self {
+            Self::V2 => hand,
+            Self::V3 => std::array::from_fn(|i| hand[i].clamp(LOWER[i], UPPER[i])),
+        }
+    }
+}
+
+/// What names an episode in every line of it.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Deserialize)]
+struct EpisodeKey {
+    #[serde(default)]
+    task: String,
+    #[serde(default)]
+    pol: String,
+    #[serde(default)]
+    seed: i64,
+}
+
+#[derive(Deserialize)]
+struct Transition {
+    ver: Version,
+    #[serde(flatten)]
+    episode: EpisodeKey,
+    t: i64,
+    obs: Vec<f64>,
+    r: f64,
+    #[serde(deserialize_with = "yes_or_no")]
+    success: bool,
+    #[serde(default, deserialize_with = "maybe_yes_or_no")]
+    near_object: Option<bool>,
+    grasp_reward: Option<f64>,
+    in_place_reward: Option<f64>,
+    obj_to_target: Option<f64>,
+    hand: Point,
+    tcp: Point,
+    lc: Point,
+    rc: Point,
+    q: Vec<f64>,
+    qd: Vec<f64>,
+    target: Point,
+    init_tcp: Point,
+    handle_init: Option<Point>,
+}
+
+#[derive(Deserialize)]
+struct Reset {
+    ver: Version,
+    obs: Vec<f64>,
+    hand: Point,
+    tcp: Point,
+    lc: Point,
+    rc: Point,
+    q: Vec<f64>,
+    target: Point,
+    init_tcp: Point,
+    handle_init: Option<Point>,
+    rand_vec: Vec<f64>,
+}
+
+#[derive(Deserialize)]
+struct TrajectoryStep {
+    ver: Version,
+    #[serde(flatten)]
+    episode: EpisodeKey,
+    t: i64,
+    hand: Point,
+    grip: f64,
+    obj: Vec<f64>,
+    tcp: Point,
+    r: f64,
+    #[serde(deserialize_with = "yes_or_no")]
+    success: bool,
+    target: Option<Point>,
+    init_tcp: Option<Point>,
+}
+
+/// 0, 1, 0.0, 1.0, false or true.
+fn yes_or_no<'de, D: Deserializer<'de>>(deserializer: D) -> Result<bool, D::Error> {
+    let value = Value::deserialize(deserializer)?;
+    match (value.as_bool(), value.as_f64()) {
+        (Some(flag), _) => Ok(flag),
+        (None, Some(0.0)) => Ok(false),
+        (None, Some(1.0)) => Ok(true),
+        _ => Err(D::Error::custom(format!("expected 0 or 1, not {value}"))),
+    }
+}
+
+fn maybe_yes_or_no<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<bool>, D::Error> {
+    yes_or_no(deserializer).map(Some)
+}
+
+/// The recorded side of a task's readings.
+struct Recorded {
+    hand: Point,
+    tcp: Point,
+    openness: f64,
+    object: Object,
+    target: Point,
+    init_tcp: Point,
+    handle_init: Option<Point>,
+}
+
+/// Where the object is, as far as the line tells.
+enum Object {
+    /// Its joint, at the time of the positions.
+    Joint(f64),
+    /// Its point of the observation.
+    Point(Point),
+}
+
+/// The task's side.
+struct Rebuilt {
+    root: Point,
+    moment: [f64; MOMENT_SIZE],
+    judgement: Judgement,
+}
+
+fn rebuild_window_open(recorded: &Recorded) -> Result<Rebuilt, String> {
+    let goal = window_open::goal([0.0; 3]);
+    let root: Point = std::array::from_fn(|i| recorded.target[i] - goal[i]);
+    let slide = match recorded.object {
+        Object::Joint(slide) => slide,
+        Object::Point(handle) => handle[0] - window_open::handle(root, 0.0)[0],
+    };
+    let readings = window_open::Readings {
+        hand: recorded.hand,
+        tcp: recorded.tcp,
+        openness: recorded.openness,
+        root,
+        slide,
+        init_tcp: recorded.init_tcp,
+        init_handle: recorded.handle_init.ok_or("missing field `handle_init`")?,
+    };
+    Ok(Rebuilt {
+        root,
+        moment: readings.moment(),
+        judgement: readings.judge(),
+    })
+}
+
+/// What earlier lines of a file say about later ones.
+#[derive(Debug, Default)]
+pub(super) struct StepsBefore {
+    last: BTreeMap<EpisodeKey, Remembered>,
+    starts: BTreeMap<EpisodeKey, Start>,
+}
+
+/// The last transition of an episode.
+#[derive(Debug)]
+struct Remembered {
+    t: i64,
+    target: Point,
+    moment: [f64; MOMENT_SIZE],
+}
+
+/// The first line of a trajectory.
+#[derive(Debug)]
+struct Start {
+    target: Point,
+    init_tcp: Point,
+    object: Point,
+}
+
+/// Compares one line. `task` is one of those that [`knows`] answers for.
+pub(super) fn check(
+    task: &str,
+    kind: Kind,
+    line: &Value,
+    before: &mut StepsBefore,
+) -> Result<Checks, String> {
+    let Some((_, rebuild)) = TASKS.iter().find(|(name, _)| *name == task) else {
+        return Err(format!("task {task} is not known"));
+    };
+    match kind {
+        Kind::Transition => check_transition(task, *rebuild, &read(line)?, before),
+        Kind::Reset => check_reset(task, *rebuild, &read(line)?),
+        Kind::Trajectory => check_trajectory(task, *rebuild, &read(line)?, before),
+    }
+}
+
+fn read<T: serde::de::DeserializeOwned>(line: &Value) -> Result<T, String> {
+    serde_json::from_value(line.clone()).map_err(|error| error.to_string())
+}
+
+fn check_transition(
+    task: &str,
+    rebuild: Rebuild,
+    line: &Transition,
+    before: &mut StepsBefore,
+) -> Result<Checks, String> {
+    let theirs = observation_of(&line.obs)?;
+    let (q, qd) = (first(&line.q, "q")?, first(&line.qd, "qd")?);
+    let rebuilt = rebuild(&Recorded {
+        hand: line.ver.shown(line.hand),
+        tcp: line.tcp,
+        openness: metaworld::openness(line.lc, line.rc),
+        object: Object::Joint(q - line.ver.lag_s() * qd),
+        target: line.target,
+        init_tcp: line.init_tcp,
+        handle_init: line.handle_init,
+    })?;
+    let step_before = before
+        .last
+        .get(&line.episode)
+        .filter(|last| last.t + 1 == line.t && metaworld::distance(last.target, line.target) < 1e-9)
+        .map(|last| last.moment);
+    let ours = metaworld::observation(&rebuilt.moment, &step_before.unwrap_or(rebuilt.moment));
+
+    let mut checks = Checks::new(format!("{task} {} transitions", line.ver.name()));
+    let judgement = rebuilt.judgement;
+    checks.number("reward", judgement.reward, line.r, REWARD_TOLERANCE);
+    checks.flag("success", judgement.success, line.success);
+    if let Some(near_object) = line.near_object {
+        checks.flag("near_object", judgement.near_object, near_object);
+    }
+    let parts = [
+        ("grasp_reward", judgement.grasp_reward, line.grasp_reward),
+        (
+            "in_place_reward",
+            judgement.in_place_reward,
+            line.in_place_reward,
+        ),
+        ("obj_to_target", judgement.obj_to_target, line.obj_to_target),
+    ];
+    for (field, ours, theirs) in parts {
+        if let Some(theirs) = theirs {
+            checks.number(field, ours, theirs, REWARD_TOLERANCE);
+        }
+    }
+    let mut slots = |field, range: std::ops::Range<usize>| {
+        checks.numbers(
+            field,
+            &ours[range.clone()],
+            &theirs[range],
+            OBSERVATION_TOLERANCE,
+        );
+    };
+    slots("observation 0-17", 0..18);
+    if step_before.is_some() {
+        slots("observation 18-35", 18..36);
+    }
+    slots("observation 36-38", 36..39);
+    before.last.insert(
+        line.episode.clone(),
+        Remembered {
+            t: line.t,
+            target: line.target,
+            moment: rebuilt.moment,
+        },
+    );
+    Ok(checks)
+}
+
+/// Checks what the original reads freshly at a reset: not the object's slots, which show the
+/// episode before, and not the second half in v2, for the same reason.
+fn check_reset(task: &str, rebuild: Rebuild, line: &Reset) -> Result<Checks, String> {
+    let theirs = observation_of(&line.obs)?;
+    let rebuilt = rebuild(&Recorded {
+        hand: line.ver.shown(line.hand),
+        tcp: line.tcp,
+        openness: metaworld::openness(line.lc, line.rc),
+        object: Object::Joint(first(&line.q, "q")?),
+        target: line.target,
+        init_tcp: line.init_tcp,
+        handle_init: line.handle_init,
+    })?;
+    let ours = metaworld::observation(&rebuilt.moment, &rebuilt.moment);
+    let mut checks = Checks::new(format!("{task} {} resets", line.ver.name()));
+    if line.rand_vec.len() != 3 {
+        return Err(format!(
+            "rand_vec has {} numbers, not 3",
+            line.rand_vec.len()
+        ));
+    }
+    checks.numbers(
+        "drawn pose",
+        &rebuilt.root,
+        &line.rand_vec,
+        OBSERVATION_TOLERANCE,
+    );
+    let mut slots = |field, range: std::ops::Range<usize>| {
+        checks.numbers(
+            field,
+            &ours[range.clone()],
+            &theirs[range],
+            OBSERVATION_TOLERANCE,
+        );
+    };
+    slots("observation 0-3", 0..4);
+    slots("observation 7-17", 7..18);
+    if line.ver == Version::V3 {
+        slots("observation 18-21", 18..22);
+        slots("observation 25-35", 25..36);
+    }
+    slots("observation 36-38", 36..39);
+    Ok(checks)
+}
+
+/// Checks reward and success; the first line of a trajectory tells the others where things are.
+fn check_trajectory(
+    task: &str,
+    rebuild: Rebuild,
+    line: &TrajectoryStep,
+    before: &mut StepsBefore,
+) -> Result<Checks, String> {
+    let mut checks = Checks::new(format!("{task} {} trajectories", line.ver.name()));
+    let object = line
+        .obj
+        .first_chunk()
+        .copied()
+        .ok_or("obj has fewer than 3 numbers")?;
+    if line.t == 0 {
+        let start = Start {
+            target: line.target.ok_or("missing field `target`")?,
+            init_tcp: line.init_tcp.ok_or("missing field `init_tcp`")?,
+            object,
+        };
+        before.starts.insert(line.episode.clone(), start);
+        return Ok(checks);
+    }
+    let start = before
+        .starts
+        .get(&line.episode)
+        .ok_or("the first line (t = 0) of this trajectory is not above it")?;
+    let rebuilt = rebuild(&Recorded {
+        hand: line.hand,
+        tcp: line.tcp,
+        openness: line.grip,
+        object: Object::Point(object),
+        target: start.target,
+        init_tcp: start.init_tcp,
+        handle_init: Some(start.object),
+    })?;
+    let judgement = rebuilt.judgement;
+    checks.number("reward", judgement.reward, line.r, TRAJECTORY_TOLERANCE);
+    checks.flag("success", judgement.success, line.success);
+    let theirs = &rebuilt.moment[4..7];
+    checks.numbers("observation 4-6", theirs, &object, OBSERVATION_TOLERANCE);
+    Ok(checks)
+}
+
+fn observation_of(numbers: &[f64]) -> Result<[f64; OBSERVATION_SIZE], String> {
+    numbers
+        .try_into()
+        .map_err(|_| format!("obs has {} numbers, not {OBSERVATION_SIZE}", numbers.len()))
+}
+
+fn first(numbers: &[f64], name: &str) -> Result<f64, String> {
+    numbers
+        .first()
+        .copied()
+        .ok_or_else(|| format!("{name} has no number in it"))
+}
