@@ -4,6 +4,8 @@ use domain::environment::{EnvSpec, Environment};
 use domain::scene::{Frame, Scene};
 
 pub mod go_fetch_return;
+pub mod metaworld;
+pub mod window_open;
 
 /// A task as the rest of the program knows it.
 #[derive(Debug)]
@@ -29,7 +31,7 @@ pub struct Task {
 
 /// Every task, in the order in which lists show them.
 pub fn tasks() -> &'static [Task] {
-    const TASKS: &[Task] = &[go_fetch_return::TASK];
+    const TASKS: &[Task] = &[go_fetch_return::TASK, window_open::TASK];
     TASKS
 }
 
