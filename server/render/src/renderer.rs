@@ -230,3 +230,6 @@ fn buffer(gpu: &Gpu, usage: wgpu::BufferUsages, bytes: &[u8]) -> wgpu::Buffer {
     gpu.queue.write_buffer(&buffer, 0, &padded);
     buffer
 }
+
+#[cfg(test)]
+mod tests;
