@@ -1,0 +1,102 @@
+//! What happened in a run, in order, for pages that follow it.
+
+use serde_json::Value;
+use sqlx::Row as _;
+
+use crate::error::StoreError;
+use crate::notice::Notice;
+use crate::run::RunId;
+use crate::store::Store;
+use crate::time::now_ms;
+use crate::writer::Transaction;
+
+/// One thing that happened.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EventRow {
+    /// Grows with time; unique over all runs.
+    pub id: u64,
+    /// `metrics`, `session_offered`, `answer`, …
+    pub kind: String,
+    /// JSON, an object with the same `kind`.
+    pub data: String,
+    /// Milliseconds since 1970.
+    pub at_ms: i64,
+}
+
+impl Store {
+    /// Keeps an event; `data` is a JSON object that carries its `kind`.
+    ///
+    /// # Errors
+    /// When it cannot be stored.
+    pub async fn add_event(&self, run: RunId, kind: &str, data: Value) -> Result<u64, StoreError> {
+        let kind = kind.to_owned();
+        self.write(move |t| Box::pin(async move { add(t, run, &kind, &data).await }))
+            .await
+    }
+
+    /// Events with ids above `after`, oldest first, at most `limit`.
+    ///
+    /// # Errors
+    /// When the database cannot be read.
+    pub async fn events_after(
+        &self,
+        run: RunId,
+        after: u64,
+        limit: u32,
+    ) -> Result<Vec<EventRow>, StoreError> {
+        let rows = sqlx::query("select id, kind, data, at_ms from event where run_id = ? and id > ? order by id limit ?")
+            .bind(run.0)
+            .bind(i64::try_from(after).unwrap_or(i64::MAX))
+            .bind(limit)
+            .fetch_all(self.readers())
+            .await?;
+        rows.iter().map(read).collect()
+    }
+
+    /// The run's events of these kinds (comma-separated), oldest first.
+    ///
+    /// # Errors
+    /// When the database cannot be read.
+    pub async fn events_of(&self, run: RunId, kinds: &[&str]) -> Result<Vec<EventRow>, StoreError> {
+        let kinds =
+            serde_json::to_string(kinds).map_err(|e| StoreError::Impossible(e.to_string()))?;
+        let rows = sqlx::query(
+            "select id, kind, data, at_ms from event
+             where run_id = ? and kind in (select value from json_each(?)) order by id",
+        )
+        .bind(run.0)
+        .bind(kinds)
+        .fetch_all(self.readers())
+        .await?;
+        rows.iter().map(read).collect()
+    }
+}
+
+pub(crate) async fn add(
+    t: &mut Transaction<'_>,
+    run: RunId,
+    kind: &str,
+    data: &Value,
+) -> Result<u64, StoreError> {
+    let row = sqlx::query(
+        "insert into event (run_id, at_ms, kind, data) values (?, ?, ?, ?) returning id",
+    )
+    .bind(run.0)
+    .bind(now_ms())
+    .bind(kind)
+    .bind(data.to_string())
+    .fetch_one(&mut *t.connection)
+    .await?;
+    let id = row.get::<i64, _>(0).unsigned_abs();
+    t.tell(Notice::Event(run, id));
+    Ok(id)
+}
+
+fn read(row: &sqlx::sqlite::SqliteRow) -> Result<EventRow, StoreError> {
+    Ok(EventRow {
+        id: row.try_get::<i64, _>(0)?.unsigned_abs(),
+        kind: row.try_get(1)?,
+        data: row.try_get(2)?,
+        at_ms: row.try_get(3)?,
+    })
+}
