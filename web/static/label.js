@@ -92,6 +92,7 @@ function firstFrameIsOn() {
   if (pressedAt) performance.measure('key-to-first-frame', { start: pressedAt, end: shownAt });
   pressedAt = 0;
   page.dataset.shown = current?.lease.lease_id ?? '';
+  page.dataset.shownAt = String(shownAt);
 }
 
 // --- answering ---------------------------------------------------------------------------------

@@ -1,0 +1,8 @@
+//! Stories told in a real Chromium: what a person sees and presses.
+
+mod accessibility;
+mod driver;
+mod in_step;
+mod labeler;
+mod session;
+mod weight;

@@ -1,0 +1,71 @@
+//! axe-core finds nothing on any page, in light and dark, contrast included; everything that can
+//! be pressed is a finger wide; no page is wider than a small phone.
+
+use serde_json::json;
+
+use super::driver::{Browser, Scheme};
+use super::labeler::{answer, run_for_people, sit_down};
+use crate::stories::server_process::ServerProcess;
+
+/// axe-core, unchanged; its version, hash and licence lie beside it.
+const AXE: &str = include_str!("vendor/axe.min.js");
+
+#[tokio::test(flavor = "multi_thread")]
+async fn axe_finds_nothing_in_light() {
+    look_at_every_page(Scheme::Light, (1280, 900)).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn axe_finds_nothing_in_dark_on_a_small_phone() {
+    look_at_every_page(Scheme::Dark, (360, 740)).await;
+}
+
+async fn look_at_every_page(scheme: Scheme, size: (u32, u32)) {
+    let Some(browser) = Browser::open(scheme, size).await else { return };
+    let data = tempfile::tempdir().expect("a temporary folder");
+    let server = ServerProcess::start(data.path());
+    let root = format!("http://{}", server.address);
+    let run = run_for_people(&server, 0.0);
+
+    browser.goto(&root).await;
+    browser.run("document.querySelectorAll('details').forEach((part) => { part.open = true; })", vec![]).await;
+    look("home", &browser).await;
+    browser.goto(&format!("{root}/runs/no-such-run")).await;
+    look("problem", &browser).await;
+    browser.goto(&format!("{root}/runs/{run}/label")).await;
+    look("name", &browser).await;
+    sit_down(&browser, &server, &run).await;
+    look("label", &browser).await;
+    browser.press("?").await;
+    look("guidance", &browser).await;
+    browser.press("?").await;
+    browser.press("u").await;
+    look("reasons", &browser).await;
+    browser.press("\u{E00C}").await;
+    answer(&browser, "1").await;
+    browser.goto(&format!("{root}/runs/{run}")).await;
+    look("run", &browser).await;
+}
+
+async fn look(page: &str, browser: &Browser) {
+    browser.client.execute(AXE, vec![]).await.expect("axe is there");
+    let violations = browser
+        .run(
+            "const found = await axe.run(document, { runOnly: ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa'] });
+             return found.violations.map((v) => [v.id, v.nodes.map((node) => node.html.slice(0, 120))]);",
+            vec![],
+        )
+        .await;
+    assert_eq!(violations, json!([]), "axe on {page}");
+    let small = browser
+        .value(
+            "[...document.querySelectorAll('a, button, select, summary, input:not([type=checkbox], [type=hidden])')]
+             .filter((item) => item.checkVisibility() && !item.closest('h3, p') && !item.matches('.skip-link'))
+             .map((item) => [item.outerHTML.slice(0, 80), item.getBoundingClientRect().height])
+             .filter(([, height]) => height < 43.9)",
+        )
+        .await;
+    assert_eq!(small, json!([]), "smaller than a finger on {page}");
+    let too_wide = browser.value("document.documentElement.scrollWidth - innerWidth").await;
+    assert!(too_wide.as_i64().is_some_and(|by| by <= 0), "{page} is too wide by {too_wide}");
+}
