@@ -47,7 +47,7 @@ impl FieldReport {
 /// Everything a replay found.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Report {
-    /// One entry per recording and field, in order of name.
+    /// One entry per recording and field, recordings in order of name.
     pub fields: Vec<FieldReport>,
     /// Lines of no known kind: why, and how many.
     pub skipped: BTreeMap<String, usize>,
@@ -61,6 +61,23 @@ impl Report {
     /// Whether every compared number is within its tolerance.
     pub fn is_within_tolerance(&self) -> bool {
         self.fields.iter().all(FieldReport::is_within_tolerance)
+    }
+
+    fn entry(&mut self, recording: &str, check: &Check) -> &mut FieldReport {
+        let fields = &mut self.fields;
+        let is_it = |f: &FieldReport| f.recording == recording && f.field == check.field;
+        let index = fields.iter().position(is_it).unwrap_or(fields.len());
+        if index == fields.len() {
+            fields.push(FieldReport {
+                recording: recording.into(),
+                field: check.field,
+                n_lines: 0,
+                largest_error: 0.0,
+                tolerance: check.tolerance,
+                worst: String::new(),
+            });
+        }
+        &mut fields[index]
     }
 }
 
@@ -109,7 +126,6 @@ fn named(path: &Path, error: &io::Error) -> io::Error {
 #[derive(Debug, Default)]
 pub struct Replay {
     report: Report,
-    fields: BTreeMap<(String, &'static str), FieldReport>,
 }
 
 impl Replay {
@@ -187,15 +203,7 @@ impl Replay {
     fn count(&mut self, checks: &Checks, place: &str) {
         self.report.n_checked += 1;
         for check in &checks.checks {
-            let key = (checks.recording.clone(), check.field);
-            let entry = self.fields.entry(key).or_insert_with(|| FieldReport {
-                recording: checks.recording.clone(),
-                field: check.field,
-                n_lines: 0,
-                largest_error: 0.0,
-                tolerance: check.tolerance,
-                worst: String::new(),
-            });
+            let entry = self.report.entry(&checks.recording, check);
             entry.n_lines += 1;
             if check.tolerance == 0.0 {
                 entry.largest_error += check.error;
@@ -210,7 +218,8 @@ impl Replay {
 
     /// What was found in all files so far.
     pub fn finish(mut self) -> Report {
-        self.report.fields = self.fields.into_values().collect();
+        let fields = &mut self.report.fields;
+        fields.sort_by(|a, b| a.recording.cmp(&b.recording));
         self.report
     }
 }

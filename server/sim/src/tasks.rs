@@ -5,6 +5,7 @@ use domain::scene::{Frame, Scene};
 
 pub mod go_fetch_return;
 pub mod metaworld;
+pub mod window;
 pub mod window_open;
 
 /// A task as the rest of the program knows it.

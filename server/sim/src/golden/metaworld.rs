@@ -8,7 +8,7 @@ use serde_json::{Map, Value};
 
 use super::{Checks, OBSERVATION_TOLERANCE, REWARD_TOLERANCE, TRAJECTORY_TOLERANCE};
 use crate::tasks::metaworld::{self, Judgement, MOMENT_SIZE, OBSERVATION_SIZE, Point};
-use crate::tasks::window_open;
+use crate::tasks::{window, window_open};
 
 /// Turns what was recorded into what the task makes of it.
 type Rebuild = fn(&Recorded) -> Result<Rebuilt, String>;
@@ -198,7 +198,7 @@ fn rebuild_window_open(recorded: &Recorded) -> Result<Rebuilt, String> {
     let root: Point = std::array::from_fn(|i| recorded.target[i] - goal[i]);
     let slide = match recorded.object {
         Object::Joint(slide) => slide,
-        Object::Point(handle) => handle[0] - window_open::handle(root, 0.0)[0],
+        Object::Point(handle) => handle[0] - window::handle(root, 0.0)[0],
     };
     let readings = window_open::Readings {
         hand: recorded.hand,

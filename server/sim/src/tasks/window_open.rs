@@ -32,15 +32,16 @@
 
 use domain::environment::{EnvError, EnvSpec, Environment, Step};
 use domain::random::{Rng, Stream};
-use domain::scene::{Frame, Geometry, Material, Scene, Shape, Transform};
-use rapier3d::prelude::*;
+use domain::scene::{Arm, Frame, Geometry, Material, Scene, Shape, Transform};
+use rapier3d::prelude::RigidBodyHandle;
 use serde::{Deserialize, Serialize};
 
-use super::Task;
 use super::metaworld::{self, Episode, Judgement, MOMENT_SIZE, Point, distance, plus};
+use super::window::handle;
+use super::{Task, window};
 use crate::reward::{Sigmoid, hamacher, tolerance};
 use crate::robots::sawyer_hand::{self, HandRange};
-use crate::robots::tabletop::{self, Layer};
+use crate::robots::tabletop;
 use crate::world;
 
 const NAME: &str = "window-open";
@@ -56,128 +57,6 @@ pub const TASK: Task = Task {
     place,
     expert,
 };
-
-// ── Geometry ───────────────────────────────────────────────────────────────────────────────
-
-/// A form of the window in the frame it belongs to: the assembly's root `P` or the pane.
-struct Part {
-    form: Form,
-    centre: [f32; 3],
-    look: Material,
-}
-
-enum Form {
-    /// Half extents.
-    Box([f32; 3]),
-    /// Radius and half length along y.
-    RodY(f32, f32),
-    /// Radius and half length along z.
-    RodZ(f32, f32),
-}
-
-const FRAME: Material = Material::plain(0.36, 0.26, 0.27);
-const HANDLE: Material = Material::plain(0.65, 0.65, 0.65);
-const GLASS: Material = Material {
-    color: [0.0, 0.3, 0.4, 0.1],
-    ..FRAME
-};
-
-const fn cuboid(centre: [f32; 3], half: [f32; 3], look: Material) -> Part {
-    Part {
-        form: Form::Box(half),
-        centre,
-        look,
-    }
-}
-
-const fn handle_part(centre: [f32; 3], form: Form) -> Part {
-    Part {
-        form,
-        centre,
-        look: HANDLE,
-    }
-}
-
-/// Frame and right pane, around `P`.
-const FIXED_PARTS: [Part; 11] = [
-    cuboid([-0.216, 0.0, 0.0], [0.015, 0.03, 0.181], FRAME),
-    cuboid([0.216, 0.0, 0.0], [0.015, 0.03, 0.181], FRAME),
-    cuboid([0.0, 0.0, -0.192], [0.25, 0.06, 0.01], FRAME),
-    cuboid([0.0, 0.0, -0.166], [0.201, 0.03, 0.015], FRAME),
-    cuboid([0.0, 0.0, 0.166], [0.201, 0.03, 0.015], FRAME),
-    cuboid([0.1, 0.013, -0.14], [0.08, 0.012, 0.01], FRAME),
-    cuboid([0.1, 0.013, 0.14], [0.08, 0.012, 0.01], FRAME),
-    cuboid([0.1, 0.008, 0.0], [0.08, 0.001, 0.13], GLASS),
-    cuboid([0.1, 0.004, 0.0], [0.08, 0.003, 0.005], FRAME),
-    cuboid([0.01, 0.013, 0.0], [0.01, 0.012, 0.15], FRAME),
-    cuboid([0.19, 0.013, 0.0], [0.01, 0.012, 0.15], FRAME),
-];
-
-/// The pane that slides, around its own frame `P + (q, 0, 0)`.
-const SLIDING_PARTS: [Part; 11] = [
-    cuboid([-0.014, -0.013, 0.0], [0.014, 0.012, 0.15], FRAME),
-    cuboid([-0.19, -0.013, 0.0], [0.01, 0.012, 0.15], FRAME),
-    cuboid([-0.104, -0.013, -0.14], [0.076, 0.012, 0.01], FRAME),
-    cuboid([-0.104, -0.013, 0.14], [0.076, 0.012, 0.01], FRAME),
-    cuboid([-0.104, -0.018, 0.0], [0.076, 0.001, 0.13], GLASS),
-    cuboid([-0.104, -0.022, 0.0], [0.076, 0.003, 0.005], FRAME),
-    handle_part([-0.014, -0.028, -0.045], Form::RodY(0.012, 0.003)),
-    handle_part([-0.014, -0.028, 0.045], Form::RodY(0.012, 0.003)),
-    handle_part([-0.014, -0.06, -0.045], Form::RodY(0.008, 0.035)),
-    handle_part([-0.014, -0.06, 0.045], Form::RodY(0.008, 0.035)),
-    handle_part([-0.014, -0.095, 0.0], Form::RodZ(0.008, 0.045)),
-];
-
-impl Part {
-    fn collider(&self, layer: Layer) -> ColliderBuilder {
-        let shape = match self.form {
-            Form::Box([x, y, z]) => ColliderBuilder::cuboid(x, y, z),
-            Form::RodY(radius, half) => ColliderBuilder::capsule_y(half, radius),
-            Form::RodZ(radius, half) => ColliderBuilder::capsule_z(half, radius),
-        };
-        tabletop::collider(shape, self.centre, layer).density(0.0)
-    }
-
-    fn shape(&self, body: usize) -> Shape {
-        let [x, y, z] = self.centre;
-        let upright = Transform::at(x, y, z);
-        let (local, geometry) = match self.form {
-            Form::Box(half) => (upright, Geometry::Cuboid { half }),
-            Form::RodY(radius, half_length) => (
-                upright.turned([1.0, 0.0, 0.0], std::f32::consts::FRAC_PI_2),
-                Geometry::Capsule {
-                    radius,
-                    half_length,
-                },
-            ),
-            Form::RodZ(radius, half_length) => (
-                upright,
-                Geometry::Capsule {
-                    radius,
-                    half_length,
-                },
-            ),
-        };
-        Shape {
-            body,
-            local,
-            geometry,
-            material: self.look,
-        }
-    }
-}
-
-/// Handle seen from the pane's frame.
-const HANDLE_POINT: Point = [-0.04, -0.095, 0.0];
-/// Goal seen from `P`; the pane's travel.
-const TRAVEL_M: f64 = 0.2;
-
-const PANE_MASS_KG: f32 = 0.638;
-const PANE_DAMPING: f32 = 2.0;
-/// Stops this stiff hold the pane within 9 mm against the expert's 2 kN, at 2 mm in the end
-/// (the original: 2.7 and 1.3 mm, where the pane also meets its frame).
-const STOP_HZ: f32 = 200.0;
-const STOP_DAMPING: f32 = 3.0;
 
 // ── Readings: from physics or from a recording ─────────────────────────────────────────────
 
@@ -200,14 +79,9 @@ pub struct Readings {
     pub init_handle: Point,
 }
 
-/// The handle of a window at `root` whose pane is open by `slide` metres.
-pub fn handle(root: Point, slide: f64) -> Point {
-    plus(plus(root, [slide, 0.0, 0.0]), HANDLE_POINT)
-}
-
-/// Where the goal of a window at `root` is.
+/// Where the pane of a window at `root` should get to.
 pub fn goal(root: Point) -> Point {
-    plus(root, [TRAVEL_M, 0.0, 0.0])
+    plus(root, [window::TRAVEL_M, 0.0, 0.0])
 }
 
 impl Readings {
@@ -280,7 +154,7 @@ impl State {
         let mut rng = Rng::new(seed, Stream::Reset, 0);
         let root = [rng.uniform_in(-0.1, 0.1), rng.uniform_in(0.7, 0.9), 0.16];
         let mut episode = Episode::new(seed, HandRange::NEAR);
-        let pane = add_window(&mut episode.world.physics, root);
+        let pane = window::add(&mut episode.world.physics, root);
         Self {
             episode,
             pane,
@@ -302,36 +176,6 @@ impl State {
             init_handle: self.init_handle,
         }
     }
-}
-
-/// Adds frame and pane; returns the pane's body.
-fn add_window(world: &mut PhysicsWorld, root: Point) -> RigidBodyHandle {
-    let at = Vector::new(root[0] as f32, root[1] as f32, root[2] as f32);
-    let frame = world.insert_body(RigidBodyBuilder::fixed().translation(at));
-    for part in &FIXED_PARTS {
-        world.insert_collider(part.collider(Layer::Fixed), Some(frame));
-    }
-    let inertia = MassProperties::new(Vector::ZERO, PANE_MASS_KG, Vector::splat(0.01));
-    let pane = RigidBodyBuilder::dynamic()
-        .translation(at)
-        .additional_mass_properties(inertia)
-        .can_sleep(false);
-    let pane = world.insert_body(pane);
-    for part in &SLIDING_PARTS {
-        world.insert_collider(part.collider(Layer::Object), Some(pane));
-    }
-    let slide = PrismaticJointBuilder::new(Vector::X)
-        .limits([0.0, TRAVEL_M as f32])
-        .softness(SpringCoefficients::new(STOP_HZ, STOP_DAMPING));
-    let joint = world
-        .insert_multibody_joint(frame, pane, slide)
-        .expect("both bodies are new, so the joint closes no loop");
-    if let Some((multibody, _)) = world.multibody_joints.get_mut(joint) {
-        multibody.forward_kinematics(&world.bodies, true);
-        multibody.damping_mut().fill(PANE_DAMPING);
-        multibody.armature_mut().fill(0.001);
-    }
-    pane
 }
 
 impl Environment for WindowOpen {
@@ -394,24 +238,23 @@ fn expert(observation: &[f32]) -> Vec<f32> {
 // ── Picture ────────────────────────────────────────────────────────────────────────────────
 
 const FRAME_BODY: usize = sawyer_hand::N_BODIES;
-const PANE_BODY: usize = FRAME_BODY + 1;
-const GOAL_BODY: usize = PANE_BODY + 1;
+const GOAL_BODY: usize = FRAME_BODY + window::N_BODIES;
 
 fn scene() -> Scene {
     let mut shapes = tabletop::scenery();
     shapes.extend(sawyer_hand::shapes());
-    shapes.extend(FIXED_PARTS.iter().map(|part| part.shape(FRAME_BODY)));
-    shapes.extend(SLIDING_PARTS.iter().map(|part| part.shape(PANE_BODY)));
+    shapes.extend(window::shapes(FRAME_BODY));
+    // The original's goal is hidden inside the frame; this one is where the grip should get to.
     shapes.push(Shape {
         body: GOAL_BODY,
         local: Transform::IDENTITY,
         geometry: Geometry::Sphere { radius: 0.02 },
-        material: Material::marker(0.0, 0.8, 0.0, 1.0),
+        material: Material::marker(0.0, 0.8, 0.0, 0.7),
     });
     Scene {
         n_bodies: GOAL_BODY + 1,
         shapes,
-        arm: Some(domain::scene::Arm::Sawyer {
+        arm: Some(Arm::Sawyer {
             hand: sawyer_hand::HAND_BODY,
         }),
         cameras: tabletop::cameras("corner3"),
@@ -422,12 +265,11 @@ fn scene() -> Scene {
 
 /// The bodies of [`scene`] in a pose of [`POSE_SIZE`] numbers.
 fn place(pose: &[f32]) -> Frame {
-    let (hand, window) = pose.split_at(sawyer_hand::POSE_SIZE);
-    let [slide, x, y, z] = [window[0], window[1], window[2], window[3]];
+    let (hand, rest) = pose.split_at(sawyer_hand::POSE_SIZE);
+    let [slide, x, y, z] = [rest[0], rest[1], rest[2], rest[3]];
     let mut frame = sawyer_hand::place(hand).to_vec();
-    frame.push(Transform::at(x, y, z));
-    frame.push(Transform::at(x + slide, y, z));
-    frame.push(Transform::at(x + TRAVEL_M as f32, y, z));
+    frame.extend(window::place([slide, x, y, z]));
+    frame.push(window::grip([window::TRAVEL_M as f32, x, y, z]));
     frame
 }
 

@@ -116,11 +116,35 @@ fn a_pose_is_drawn_where_the_physics_had_it() {
     assert_eq!(frame.len(), scene().n_bodies);
     let hand = frame[sawyer_hand::HAND_BODY].position;
     assert!((f64::from(hand[0]) - readings.hand[0]).abs() < 1e-6);
-    let pane_x = f64::from(frame[PANE_BODY].position[0]);
+    let pane_x = f64::from(frame[FRAME_BODY + 1].position[0]);
     assert!((pane_x - readings.root[0] - readings.slide).abs() < 1e-6);
     assert!(
         readings.slide > 0.05,
         "the window is on its way: {}",
         readings.slide
     );
+}
+
+#[test]
+fn an_episode_goes_on_bit_for_bit_from_a_snapshot_taken_while_pushing() {
+    let mut environment = WindowOpen::new();
+    let mut observation = environment.reset(5);
+    let advance = |environment: &mut WindowOpen, observation: &mut Vec<f32>| {
+        let step = environment.step(&expert(observation));
+        *observation = step.expect("the expert's actions fit").observation;
+        observation.iter().map(|x| x.to_bits()).collect::<Vec<_>>()
+    };
+    while environment.readings().slide < 0.05 {
+        advance(&mut environment, &mut observation);
+    }
+    let mut restored = WindowOpen::new();
+    let snapshot = environment.snapshot();
+    restored.restore(&snapshot).expect("it is its own snapshot");
+    let mut observation_restored = observation.clone();
+    for _ in 0..300 {
+        assert_eq!(
+            advance(&mut environment, &mut observation),
+            advance(&mut restored, &mut observation_restored)
+        );
+    }
 }
