@@ -411,7 +411,7 @@ async fn insert(
         "kind": "answer", "question": leased.kind, "sequence": sequence, "query": leased.query,
         "answer": pressed.word(), "superseded": answer.supersedes.is_some(),
     });
-    event::add(t, leased.run, "answer", &data).await?;
+    event::add(t, leased.run, &data).await?;
     let action = if answer.supersedes.is_some() {
         "superseded"
     } else {

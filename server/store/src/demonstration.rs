@@ -1,11 +1,9 @@
 //! Episodes of the policy to look at: "how it does now".
 
-use serde_json::json;
 use sqlx::Row as _;
 
 use crate::clip::{self, ClipRow, NewClip};
 use crate::error::StoreError;
-use crate::event;
 use crate::run::RunId;
 use crate::store::Store;
 use crate::time::now_ms;
@@ -37,7 +35,7 @@ pub struct DemonstrationRow {
 }
 
 impl Store {
-    /// Keeps an episode's clip and tells the run's followers.
+    /// Keeps an episode's clip.
     ///
     /// # Errors
     /// When it cannot be stored.
@@ -65,12 +63,6 @@ impl Store {
                 .bind(now_ms())
                 .execute(&mut *t.connection)
                 .await?;
-                let data = json!({
-                    "kind": "demonstration", "session": shows.session, "step": shows.step,
-                    "success": shows.success, "task_return": shows.task_return,
-                    "clip": format!("/api/v1/clips/{}.mp4", clip.sha256),
-                });
-                event::add(t, run, "demonstration", &data).await?;
                 Ok(())
             })
         })

@@ -24,13 +24,19 @@ pub struct EventRow {
 }
 
 impl Store {
-    /// Keeps an event; `data` is a JSON object that carries its `kind`.
+    /// Keeps an event under a name that is unique in its run; `data` is a JSON object that
+    /// carries its `kind`. Returns its id, or `None` where the name was logged before.
     ///
     /// # Errors
     /// When it cannot be stored.
-    pub async fn add_event(&self, run: RunId, kind: &str, data: Value) -> Result<u64, StoreError> {
-        let kind = kind.to_owned();
-        self.write(move |t| Box::pin(async move { add(t, run, &kind, &data).await }))
+    pub async fn append_event(
+        &self,
+        run: RunId,
+        name: &str,
+        data: &Value,
+    ) -> Result<Option<u64>, StoreError> {
+        let (name, data) = (name.to_owned(), data.clone());
+        self.write(move |t| Box::pin(async move { add_named(t, run, Some(&name), &data).await }))
             .await
     }
 
@@ -72,24 +78,35 @@ impl Store {
     }
 }
 
+/// Logs an event without a name.
 pub(crate) async fn add(
     t: &mut Transaction<'_>,
     run: RunId,
-    kind: &str,
     data: &Value,
-) -> Result<u64, StoreError> {
+) -> Result<(), StoreError> {
+    add_named(t, run, None, data).await.map(|_| ())
+}
+
+async fn add_named(
+    t: &mut Transaction<'_>,
+    run: RunId,
+    name: Option<&str>,
+    data: &Value,
+) -> Result<Option<u64>, StoreError> {
     let row = sqlx::query(
-        "insert into event (run_id, at_ms, kind, data) values (?, ?, ?, ?) returning id",
+        "insert into event (run_id, at_ms, name, kind, data) values (?, ?, ?, ?, ?) on conflict do nothing returning id",
     )
     .bind(run.0)
     .bind(now_ms())
-    .bind(kind)
+    .bind(name)
+    .bind(data["kind"].as_str().unwrap_or("event"))
     .bind(data.to_string())
-    .fetch_one(&mut *t.connection)
+    .fetch_optional(&mut *t.connection)
     .await?;
-    let id = row.get::<i64, _>(0).unsigned_abs();
+    let Some(row) = row else { return Ok(None) };
+    let id = row.try_get::<i64, _>(0)?.unsigned_abs();
     t.tell(Notice::Event(run, id));
-    Ok(id)
+    Ok(Some(id))
 }
 
 fn read(row: &sqlx::sqlite::SqliteRow) -> Result<EventRow, StoreError> {

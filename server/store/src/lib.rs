@@ -31,7 +31,7 @@ pub use label::{AnsweredPair, Label};
 pub use labeler::{Labeler, LabelerId};
 pub use lease::{Lease, LeaseClip, Queue};
 pub use query::{BadQuery, ClipJob, QueryId, TaskRewards};
-pub use run::{NewRun, Progress, RunId, RunRow};
+pub use run::{NewRun, Progress, RunId, RunRow, RunState};
 pub use secret::Secret;
 pub use store::Store;
 pub use time::{now_ms, rfc3339};

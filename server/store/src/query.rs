@@ -158,7 +158,7 @@ impl Store {
                 let Some(row) = row else { return Ok(()) }; // drawn twice: the first drawing stays
                 let (run, session) = (RunId(row.try_get(0)?), row.try_get::<u32, _>(1)?);
                 let data = json!({"kind": "clips_ready", "session": session, "query": query});
-                event::add(t, run, "clips_ready", &data).await?;
+                event::add(t, run, &data).await?;
                 Ok(())
             })
         })
@@ -185,7 +185,7 @@ impl Store {
                 let Some(row) = row else { return Ok(()) };
                 let (run, session) = (RunId(row.try_get(0)?), row.try_get::<u32, _>(1)?);
                 let data = json!({"kind": "clip_failed", "session": session, "query": query, "reason": trouble});
-                event::add(t, run, "clip_failed", &data).await?;
+                event::add(t, run, &data).await?;
                 answer::skip_by_server(t, query, &trouble).await
             })
         })

@@ -34,10 +34,12 @@ pub struct NewRun {
     pub preset: String,
     /// Of every random stream.
     pub seed: u64,
-    /// `human`, `program`, or a scripted teacher's name.
+    /// `human`, `http`, or a scripted teacher's name.
     pub teacher: String,
+    /// Whether clips of its queries are drawn.
+    pub draws_clips: bool,
     /// The resolved settings as TOML.
-    pub settings: String,
+    pub config: String,
     /// Answers in all.
     pub budget: u32,
     /// Environment steps in all.
@@ -51,22 +53,47 @@ pub struct NewRun {
 pub struct RunRow {
     /// Number.
     pub id: RunId,
-    /// What it was started with.
-    pub started_as: NewRun,
+    /// The task's name.
+    pub task: String,
+    /// The method's name.
+    pub method: String,
+    /// Presets on top of the task's and the method's own, comma-separated; may be empty.
+    pub preset: String,
+    /// Of every random stream.
+    pub seed: u64,
+    /// `human`, `http`, or a scripted teacher's name.
+    pub teacher: String,
+    /// Whether clips of its queries are drawn.
+    pub draws_clips: bool,
+    /// The resolved settings as TOML.
+    pub config: String,
+    /// Answers in all.
+    pub budget: u32,
+    /// Environment steps in all.
+    pub total_steps: u64,
+    /// Whether an agent learns from the answers.
+    pub is_trained: bool,
     /// Environment steps taken.
     pub step: u64,
     /// Preferences received, skips not counted.
     pub n_labels: u32,
-    /// `training`, `waiting_for_labels`, `paused`, `finished`, `stopped`, `failed`.
-    pub state: String,
-    /// What it is doing, in a line.
-    pub state_message: String,
-    /// What comes next, in a line.
-    pub state_next: String,
-    /// Since when, milliseconds since 1970.
-    pub state_since_ms: i64,
+    /// What it is doing.
+    pub state: RunState,
     /// When it was made, milliseconds since 1970.
     pub created_at_ms: i64,
+}
+
+/// A run's state in one line.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RunState {
+    /// `training`, `waiting_for_labels`, `paused`, `finished`, `stopped`, `failed`.
+    pub kind: String,
+    /// What it is doing.
+    pub message: String,
+    /// What comes next.
+    pub next: String,
+    /// Since when, milliseconds since 1970.
+    pub since_ms: i64,
 }
 
 /// How far the asking is.
@@ -94,16 +121,17 @@ impl Store {
             Box::pin(async move {
                 let now = now_ms();
                 let row = sqlx::query(
-                    "insert into run (task, method, preset, seed, teacher, settings, budget, total_steps, is_trained,
+                    "insert into run (task, method, preset, seed, teacher, draws_clips, config, budget, total_steps, is_trained,
                         state, state_message, state_next, state_since_ms, created_at_ms)
-                     values (?, ?, ?, ?, ?, ?, ?, ?, ?, 'training', 'getting ready', '', ?, ?) returning id",
+                     values (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, 'training', 'getting ready', '', ?, ?) returning id",
                 )
                 .bind(&run.task)
                 .bind(&run.method)
                 .bind(&run.preset)
                 .bind(run.seed.cast_signed())
                 .bind(&run.teacher)
-                .bind(&run.settings)
+                .bind(run.draws_clips)
+                .bind(&run.config)
                 .bind(run.budget)
                 .bind(run.total_steps.cast_signed())
                 .bind(run.is_trained)
@@ -121,16 +149,16 @@ impl Store {
         .await
     }
 
-    /// One run.
+    /// One run; `None` for a number that no run has.
     ///
     /// # Errors
-    /// [`StoreError::Missing`].
-    pub async fn run(&self, id: RunId) -> Result<RunRow, StoreError> {
+    /// When the database cannot be read.
+    pub async fn run(&self, id: RunId) -> Result<Option<RunRow>, StoreError> {
         let row = sqlx::query("select * from run where id = ?")
             .bind(id.0)
             .fetch_optional(self.readers())
             .await?;
-        read(&row.ok_or_else(|| StoreError::missing("run", id))?)
+        row.as_ref().map(read).transpose()
     }
 
     /// All runs, newest first.
@@ -149,7 +177,7 @@ impl Store {
     ///
     /// # Errors
     /// [`StoreError::Missing`]; [`StoreError::Rule`] for a state that is none.
-    pub async fn set_state(
+    pub async fn set_run_state(
         &self,
         run: RunId,
         state: &str,
@@ -180,7 +208,7 @@ impl Store {
                 if before != state {
                     let data =
                         json!({"kind": "state", "state": state, "message": message, "next": next});
-                    event::add(t, run, "state", &data).await?;
+                    event::add(t, run, &data).await?;
                     let deed = Deed {
                         labeler: None,
                         run: Some(run),
@@ -196,15 +224,22 @@ impl Store {
         .await
     }
 
-    /// Notes how far the run is.
+    /// Notes how far the run is. `n_labels` where a script inside the run answers; the answers of
+    /// people and programs are counted when they are stored.
     ///
     /// # Errors
     /// When it cannot be stored.
-    pub async fn set_step(&self, run: RunId, step: u64) -> Result<(), StoreError> {
+    pub async fn set_step(
+        &self,
+        run: RunId,
+        step: u64,
+        n_labels: Option<u32>,
+    ) -> Result<(), StoreError> {
         self.write(move |t| {
             Box::pin(async move {
-                sqlx::query("update run set step = ? where id = ?")
+                sqlx::query("update run set step = ?, n_labels = coalesce(?, n_labels) where id = ?")
                     .bind(step.cast_signed())
+                    .bind(n_labels)
                     .bind(run.0)
                     .execute(&mut *t.connection)
                     .await?;
@@ -249,23 +284,24 @@ impl Store {
 fn read(row: &SqliteRow) -> Result<RunRow, StoreError> {
     Ok(RunRow {
         id: RunId(row.try_get("id")?),
-        started_as: NewRun {
-            task: row.try_get("task")?,
-            method: row.try_get("method")?,
-            preset: row.try_get("preset")?,
-            seed: row.try_get::<i64, _>("seed")?.cast_unsigned(),
-            teacher: row.try_get("teacher")?,
-            settings: row.try_get("settings")?,
-            budget: row.try_get("budget")?,
-            total_steps: row.try_get::<i64, _>("total_steps")?.cast_unsigned(),
-            is_trained: row.try_get("is_trained")?,
-        },
+        task: row.try_get("task")?,
+        method: row.try_get("method")?,
+        preset: row.try_get("preset")?,
+        seed: row.try_get::<i64, _>("seed")?.cast_unsigned(),
+        teacher: row.try_get("teacher")?,
+        draws_clips: row.try_get("draws_clips")?,
+        config: row.try_get("config")?,
+        budget: row.try_get("budget")?,
+        total_steps: row.try_get::<i64, _>("total_steps")?.cast_unsigned(),
+        is_trained: row.try_get("is_trained")?,
         step: row.try_get::<i64, _>("step")?.cast_unsigned(),
         n_labels: row.try_get("n_labels")?,
-        state: row.try_get("state")?,
-        state_message: row.try_get("state_message")?,
-        state_next: row.try_get("state_next")?,
-        state_since_ms: row.try_get("state_since_ms")?,
+        state: RunState {
+            kind: row.try_get("state")?,
+            message: row.try_get("state_message")?,
+            next: row.try_get("state_next")?,
+            since_ms: row.try_get("state_since_ms")?,
+        },
         created_at_ms: row.try_get("created_at_ms")?,
     })
 }

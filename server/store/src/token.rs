@@ -89,7 +89,9 @@ impl Store {
     /// # Errors
     /// [`StoreError::Missing`] for an unknown run.
     pub async fn add_teacher_token(&self, run: RunId) -> Result<Secret, StoreError> {
-        self.run(run).await?;
+        self.run(run)
+            .await?
+            .ok_or_else(|| StoreError::missing("run", run))?;
         let secret = Secret::random()?;
         let hash = secret.hash();
         self.write(move |t| {
