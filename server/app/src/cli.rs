@@ -4,14 +4,23 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+mod client;
+mod evaluate;
+mod golden;
+mod openapi;
+mod render;
 mod serve;
+mod tasks;
+mod teach;
+mod train;
 
 /// Train agents from human preferences, segment by segment (STAIR).
 #[derive(Debug, Parser)]
 #[command(name = "stair", version = VERSION, max_term_width = 100)]
 #[command(after_help = "Examples:
   stair serve                       open http://127.0.0.1:8080 and choose a task
-  stair serve --bind 127.0.0.1:9000 --data ~/stair")]
+  stair train go-fetch-return --preset quick
+  stair tasks                       all tasks, methods, presets and teachers")]
 struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -22,6 +31,13 @@ const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), " (", env!("STAIR_REVIS
 #[derive(Debug, Subcommand)]
 enum Command {
     Serve(serve::Args),
+    Train(train::Args),
+    Evaluate(evaluate::Args),
+    Teach(teach::Args),
+    Render(render::Args),
+    Golden(golden::Args),
+    Tasks(tasks::Args),
+    Openapi(openapi::Args),
 }
 
 /// What the user typed, or a file that they named, does not fit. The program ends with code 2.
@@ -53,6 +69,13 @@ impl std::error::Error for BadInput {}
 pub fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Serve(args) => serve::run(args),
+        Command::Train(args) => train::run(args),
+        Command::Evaluate(args) => evaluate::run(args),
+        Command::Teach(args) => teach::run(args),
+        Command::Render(args) => render::run(args),
+        Command::Golden(args) => golden::run(&args),
+        Command::Tasks(args) => tasks::run(args),
+        Command::Openapi(args) => openapi::run(&args),
     };
     result.unwrap_or_else(|error| {
         eprintln!("stair: {error:#}");
