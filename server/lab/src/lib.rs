@@ -3,4 +3,18 @@
 //! Invariants: knows neither pixels nor SQL nor people; talks to the world through
 //! [`message`] and [`domain::teacher::Teacher`] alone; a method is a recipe of parts.
 
+pub mod config;
+pub mod evaluate;
 pub mod message;
+pub mod method;
+pub mod nearest;
+pub mod policy;
+pub mod run;
+
+mod candidates;
+mod folder;
+mod lanes;
+mod learner;
+mod meter;
+mod preferences;
+mod session;

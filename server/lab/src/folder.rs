@@ -1,0 +1,190 @@
+//! A run's folder on disk: settings, metrics, replay files and the two newest checkpoints.
+//!
+//! A checkpoint names the lengths of the append-only files that belong to it; whatever lies
+//! beyond was written after it and is cut when the run resumes.
+
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, Write as _};
+use std::path::{Path, PathBuf};
+
+use learn::checkpoint::Archive;
+
+use crate::message::Event;
+use crate::run::RunError;
+
+/// Paths and open files of one run.
+pub(crate) struct RunFolder {
+    root: PathBuf,
+    metrics: File,
+}
+
+impl RunFolder {
+    /// Makes the folder of a new run. Until [`RunFolder::seal`] it counts as empty, and what a
+    /// start that was cut short left in it is removed.
+    ///
+    /// # Errors
+    /// When it holds a run already or cannot be written.
+    pub(crate) fn create(root: &Path) -> Result<Self, RunError> {
+        if Self::holds_run(root) {
+            return Err(RunError::Occupied {
+                folder: root.to_owned(),
+            });
+        }
+        let replay = root.join("replay");
+        if replay.exists() {
+            fs::remove_dir_all(&replay).map_err(io_error("clear the run's folder", &replay))?;
+        }
+        fs::create_dir_all(&replay).map_err(io_error("make the run's folder", root))?;
+        let mut folder = Self::at(root)?;
+        for step in folder.checkpoints()? {
+            let path = folder.checkpoint_path(step);
+            fs::remove_file(&path).map_err(io_error("clear the run's folder", &path))?;
+        }
+        folder.cut_metrics(0)?;
+        Ok(folder)
+    }
+
+    /// Saves the settings, after the first checkpoint: from now on the folder holds a run.
+    ///
+    /// # Errors
+    /// When the disk refuses.
+    pub(crate) fn seal(&self, config: &str) -> Result<(), RunError> {
+        write_durably(&self.root.join("config.toml"), config.as_bytes())
+    }
+
+    /// Whether a run was started in this folder.
+    pub(crate) fn holds_run(root: &Path) -> bool {
+        root.join("config.toml").exists()
+    }
+
+    /// The folder of a run that was started before.
+    ///
+    /// # Errors
+    /// When there is none or it cannot be read.
+    pub(crate) fn open(root: &Path) -> Result<(Self, String), RunError> {
+        let path = root.join("config.toml");
+        let config =
+            fs::read_to_string(&path).map_err(io_error("read the run's settings", &path))?;
+        Ok((Self::at(root)?, config))
+    }
+
+    fn at(root: &Path) -> Result<Self, RunError> {
+        let path = root.join("metrics.jsonl");
+        let metrics = OpenOptions::new().create(true).append(true).open(&path);
+        Ok(Self {
+            root: root.to_owned(),
+            metrics: metrics.map_err(io_error("open the metrics", &path))?,
+        })
+    }
+
+    /// Where the replay keeps its files.
+    pub(crate) fn replay(&self) -> PathBuf {
+        self.root.join("replay")
+    }
+
+    /// Appends an event as a JSON line. Poses of demonstrations and phases are not kept here.
+    ///
+    /// # Errors
+    /// When the disk refuses.
+    pub(crate) fn record(&mut self, event: &Event) -> Result<(), RunError> {
+        if matches!(
+            event,
+            Event::Phase(_) | Event::Demonstration(_) | Event::Checkpointed(_)
+        ) {
+            return Ok(());
+        }
+        let mut line = serde_json::to_vec(event).expect("events are plain values");
+        line.push(b'\n');
+        let path = self.root.join("metrics.jsonl");
+        self.metrics
+            .write_all(&line)
+            .map_err(io_error("write the metrics", &path))
+    }
+
+    /// Bytes of metrics so far, made durable.
+    ///
+    /// # Errors
+    /// When the disk refuses.
+    pub(crate) fn sync_metrics(&mut self) -> Result<u64, RunError> {
+        let path = self.root.join("metrics.jsonl");
+        self.metrics
+            .sync_data()
+            .map_err(io_error("save the metrics", &path))?;
+        Ok(self
+            .metrics
+            .metadata()
+            .map_err(io_error("save the metrics", &path))?
+            .len())
+    }
+
+    /// Cuts the metrics to what belongs to a checkpoint.
+    ///
+    /// # Errors
+    /// When the disk refuses.
+    pub(crate) fn cut_metrics(&mut self, len: u64) -> Result<(), RunError> {
+        let path = self.root.join("metrics.jsonl");
+        self.metrics
+            .set_len(len)
+            .map_err(io_error("cut the metrics", &path))
+    }
+
+    /// Writes a checkpoint and removes all but the newest two.
+    ///
+    /// # Errors
+    /// When the disk refuses; the older checkpoints are then untouched.
+    pub(crate) fn save(&self, step: u64, archive: &Archive) -> Result<(), RunError> {
+        archive.write(&self.checkpoint_path(step))?;
+        for old in self.checkpoints()?.into_iter().rev().skip(2) {
+            let path = self.checkpoint_path(old);
+            fs::remove_file(&path).map_err(io_error("remove an old checkpoint", &path))?;
+        }
+        Ok(())
+    }
+
+    /// Steps of the checkpoints that there are, oldest first.
+    ///
+    /// # Errors
+    /// When the folder cannot be read.
+    pub(crate) fn checkpoints(&self) -> Result<Vec<u64>, RunError> {
+        let entries =
+            fs::read_dir(&self.root).map_err(io_error("read the run's folder", &self.root))?;
+        let mut steps: Vec<u64> = entries
+            .filter_map(|entry| {
+                let name = entry.ok()?.file_name().into_string().ok()?;
+                name.strip_prefix("checkpoint-")?
+                    .strip_suffix(".stair")?
+                    .parse()
+                    .ok()
+            })
+            .collect();
+        steps.sort_unstable();
+        Ok(steps)
+    }
+
+    /// Where the checkpoint of a step lies.
+    pub(crate) fn checkpoint_path(&self, step: u64) -> PathBuf {
+        self.root.join(format!("checkpoint-{step:09}.stair"))
+    }
+}
+
+fn write_durably(path: &Path, bytes: &[u8]) -> Result<(), RunError> {
+    let draft = path.with_extension("draft");
+    let written = File::create(&draft).and_then(|mut file| {
+        file.write_all(bytes)?;
+        file.sync_all()?;
+        fs::rename(&draft, path)
+    });
+    written.map_err(io_error("save", path))
+}
+
+/// Says what was tried, and where.
+pub(crate) fn io_error<'a>(
+    doing: &'static str,
+    path: &'a Path,
+) -> impl FnOnce(io::Error) -> RunError + 'a {
+    move |source| RunError::Io {
+        doing,
+        path: path.to_owned(),
+        source,
+    }
+}

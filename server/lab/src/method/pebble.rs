@@ -1,0 +1,16 @@
+//! PEBBLE: unsupervised pre-training, disagreement sampling, relabelling.
+
+use domain::sampler::Disagreement;
+use learn::replay::RewardSource;
+
+use super::Method;
+use crate::config::RunConfig;
+
+/// Asks where the ensemble disagrees.
+pub(crate) fn pebble(_config: &RunConfig) -> Method {
+    Method {
+        sampler: Some(Box::new(Disagreement)),
+        reward: RewardSource::Learned,
+        learns_temporal_distance: false,
+    }
+}

@@ -1,0 +1,15 @@
+//! SAC on the task reward: what a perfect reward model could reach.
+
+use learn::replay::RewardSource;
+
+use super::Method;
+use crate::config::RunConfig;
+
+/// Never asks; the critics see the task reward.
+pub(crate) fn sac(_config: &RunConfig) -> Method {
+    Method {
+        sampler: None,
+        reward: RewardSource::Task,
+        learns_temporal_distance: false,
+    }
+}

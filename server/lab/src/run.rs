@@ -1,0 +1,635 @@
+//! Algorithm 1: act, ask, learn. One loop for every method.
+
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, TryRecvError};
+use std::time::Duration;
+
+use domain::environment::{EnvError, EnvSpec};
+use domain::random::{Rng, Stream};
+use domain::sampler::{QuerySampler, Uniform};
+use domain::schedule::Every;
+use domain::teacher::{Teacher, TeacherError};
+use learn::LearnError;
+use learn::beliefs::LearnedBeliefs;
+use learn::checkpoint::Archive;
+use learn::device::Device;
+use learn::replay::{Replay, ReplayMark, ReplayShape};
+use serde::{Deserialize, Serialize};
+
+use crate::candidates;
+use crate::config::{ConfigError, RunConfig, WhileWaiting, find_task};
+use crate::evaluate::{Trial, correlation, evaluate};
+use crate::folder::RunFolder;
+use crate::lanes::{Lanes, LanesState};
+use crate::learner::{Due, Learner};
+use crate::message::{
+    Activity, Checkpointed, Command, Demonstration, Evaluation, Event, Finished, Phase,
+    SessionClosed,
+};
+use crate::meter::Meter;
+use crate::method::{self, Method};
+use crate::preferences::{AnswerState, Preferences};
+use crate::session::{Selection, Session};
+
+/// How long the loop rests when there is nothing to do but wait for people.
+const REST: Duration = Duration::from_millis(20);
+
+/// Held-out episodes are the same for every run, so that runs can be compared.
+const HELD_OUT: u64 = 0;
+
+/// A run: an agent, its experience, and what is known of the answers.
+pub struct Run {
+    config: RunConfig,
+    task: &'static sim::tasks::Task,
+    spec: EnvSpec,
+    method: Method,
+    folder: RunFolder,
+    lanes: Lanes,
+    replay: Replay,
+    learner: Learner,
+    preferences: Preferences,
+    session: Option<Session>,
+    progress: Progress,
+    meter: Meter,
+    is_paused: bool,
+    last_activity: Option<Activity>,
+}
+
+/// Counters that a checkpoint keeps.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+struct Progress {
+    step: u64,
+    n_sessions: u32,
+    n_fits: u32,
+    consumed_sequence: u64,
+    last_evaluation: Option<(f64, f64)>,
+}
+
+/// How [`Run::drive`] ended.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Outcome {
+    /// All environment steps are taken.
+    Finished(Finished),
+    /// A command stopped it; it can be resumed.
+    Stopped,
+}
+
+/// Why a run cannot go on.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// Settings that cannot be used.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// Tensors, devices and checkpoints.
+    #[error(transparent)]
+    Learn(#[from] LearnError),
+    /// A simulation that failed.
+    #[error(transparent)]
+    Environment(#[from] EnvError),
+    /// A teacher that cannot be asked.
+    #[error("the teacher cannot go on: {0}")]
+    Teacher(#[from] TeacherError),
+    /// The disk.
+    #[error("cannot {doing} ({path}): {source}")]
+    Io {
+        /// What was tried.
+        doing: &'static str,
+        /// Where.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// A new run where one is already.
+    #[error("{folder} holds a run already; resume it or choose another folder")]
+    Occupied {
+        /// Where.
+        folder: PathBuf,
+    },
+    /// None of the checkpoints can be read.
+    #[error("no checkpoint in {folder} can be used: {reasons}")]
+    NoCheckpoint {
+        /// Where.
+        folder: PathBuf,
+        /// What each said.
+        reasons: String,
+    },
+}
+
+impl Run {
+    /// Makes a run's folder and its first checkpoint.
+    ///
+    /// # Errors
+    /// [`RunError`]; nothing is started.
+    pub fn start(config: RunConfig, folder: &Path) -> Result<Self, RunError> {
+        let task = find_task(&config.task)?;
+        let spec = (task.spec)();
+        let method = (method::find(&config.method)?.build)(&config);
+        let learner = Learner::new(&config, &spec, &method, Device::open(&config.device)?);
+        let mut replay = Replay::new(shape(&spec), config.environment.n_envs);
+        let lanes = Lanes::start(task, config.environment.n_envs, config.seed, &mut replay);
+        let folder = RunFolder::create(folder)?;
+        let mut run = Self {
+            task,
+            spec,
+            method,
+            folder,
+            lanes,
+            replay,
+            learner,
+            preferences: Preferences::default(),
+            session: None,
+            progress: Progress::default(),
+            meter: Meter::default(),
+            is_paused: false,
+            last_activity: None,
+            config,
+        };
+        run.checkpoint()?;
+        run.folder.seal(&run.config.to_toml())?;
+        Ok(run)
+    }
+
+    /// Whether a run was started in this folder, so that [`Run::resume`] can take it up.
+    pub fn exists(folder: &Path) -> bool {
+        RunFolder::holds_run(folder)
+    }
+
+    /// Takes a run up again from its newest checkpoint that can be read. Returns what was
+    /// wrong with newer ones, for the person who reads the log.
+    ///
+    /// # Errors
+    /// [`RunError`]; nothing is changed.
+    pub fn resume(folder: &Path) -> Result<(Self, Vec<String>), RunError> {
+        let (run_folder, text) = RunFolder::open(folder)?;
+        let config = RunConfig::parse("config.toml", &text)?;
+        let mut complaints = Vec::new();
+        let steps = run_folder.checkpoints()?;
+        let mut run_folder = Some(run_folder);
+        for step in steps.into_iter().rev() {
+            let opened = match run_folder.take() {
+                Some(folder) => folder,
+                None => RunFolder::open(folder)?.0,
+            };
+            match Self::restore(config.clone(), opened, step) {
+                Ok(run) => return Ok((run, complaints)),
+                Err(error) => complaints.push(format!("checkpoint of step {step}: {error}")),
+            }
+        }
+        let reasons = if complaints.is_empty() {
+            "there is none".into()
+        } else {
+            complaints.join("; ")
+        };
+        Err(RunError::NoCheckpoint {
+            folder: folder.to_owned(),
+            reasons,
+        })
+    }
+
+    fn restore(config: RunConfig, mut folder: RunFolder, step: u64) -> Result<Self, RunError> {
+        let archive = Archive::read(&folder.checkpoint_path(step))?;
+        let task = find_task(&config.task)?;
+        let spec = (task.spec)();
+        let method = (method::find(&config.method)?.build)(&config);
+        let mut learner = Learner::new(&config, &spec, &method, Device::open(&config.device)?);
+        learner.load(&archive)?;
+        let lanes = Lanes::restore(task, config.seed, archive.json::<LanesState>("lanes")?)?;
+        let mark: ReplayMark = archive.json("replay")?;
+        let replay = Replay::open(
+            &folder.replay(),
+            shape(&spec),
+            config.environment.n_envs,
+            &mark,
+        )?;
+        folder.cut_metrics(archive.json("metrics_len")?)?;
+        Ok(Self {
+            preferences: archive.json("preferences")?,
+            session: archive.json("session")?,
+            progress: archive.json("progress")?,
+            task,
+            spec,
+            method,
+            folder,
+            lanes,
+            replay,
+            learner,
+            meter: Meter::default(),
+            is_paused: false,
+            last_activity: None,
+            config,
+        })
+    }
+
+    /// The resolved settings.
+    pub fn config(&self) -> &RunConfig {
+        &self.config
+    }
+
+    /// Environment steps taken.
+    pub fn step(&self) -> u64 {
+        self.progress.step
+    }
+
+    /// Answers up to this sequence number have been taken in.
+    pub fn consumed_sequence(&self) -> u64 {
+        self.progress.consumed_sequence
+    }
+
+    /// Runs Algorithm 1 to the end, or until told to stop.
+    ///
+    /// # Errors
+    /// [`RunError`]; the last checkpoint remains.
+    pub fn drive(
+        &mut self,
+        teacher: &mut dyn Teacher,
+        commands: &Receiver<Command>,
+        events: &mut dyn FnMut(Event),
+    ) -> Result<Outcome, RunError> {
+        learn::device::init();
+        self.offer_open_queries(teacher)?;
+        while !self.is_over() {
+            if self.obey(commands) == Some(Command::Stop) {
+                self.checkpoint_and_say(events)?;
+                return Ok(Outcome::Stopped);
+            }
+            self.take_answers(teacher)?;
+            if self.session_is_complete() {
+                self.learn_from_session(events)?;
+            } else if self.stands_still() {
+                self.say_activity(events);
+                std::thread::sleep(REST);
+            } else if self.asks_now() {
+                self.ask(teacher, events)?;
+            } else {
+                self.say_activity(events);
+                self.advance(events)?;
+            }
+        }
+        self.finish(events)
+    }
+
+    fn is_over(&self) -> bool {
+        self.progress.step >= self.config.training.total_steps && self.session.is_none()
+    }
+
+    fn obey(&mut self, commands: &Receiver<Command>) -> Option<Command> {
+        loop {
+            match commands.try_recv() {
+                Ok(Command::Pause) => self.is_paused = true,
+                Ok(Command::Resume) => self.is_paused = false,
+                Ok(Command::Stop) => return Some(Command::Stop),
+                Err(TryRecvError::Empty | TryRecvError::Disconnected) => return None,
+            }
+        }
+    }
+
+    /// Puts what is open to the teacher again: after a resume nobody may have been asked yet.
+    fn offer_open_queries(&mut self, teacher: &mut dyn Teacher) -> Result<(), RunError> {
+        let Some(session) = &self.session else {
+            return Ok(());
+        };
+        let open = session.planned().iter();
+        let open = open.filter(|p| self.preferences.state(p.key()) == Some(AnswerState::Open));
+        let offers: Vec<_> = open.map(|p| p.offer(&self.replay)).collect();
+        Ok(teacher.ask(&offers)?)
+    }
+
+    /// Takes in answers that arrived; asks a replacement for each skip of the open session.
+    fn take_answers(&mut self, teacher: &mut dyn Teacher) -> Result<(), RunError> {
+        for answered in teacher.collect(self.progress.consumed_sequence)? {
+            self.progress.consumed_sequence = answered.sequence;
+            let before = self.preferences.answer(&answered);
+            let is_new_skip = answered.preference.is_none() && before == Some(AnswerState::Open);
+            let Some(session) = self
+                .session
+                .as_mut()
+                .filter(|s| s.index() == answered.key.session)
+            else {
+                continue;
+            };
+            if is_new_skip && let Some(replacement) = session.replacement() {
+                self.preferences.ask(replacement.key(), replacement.query());
+                teacher.ask(&[replacement.offer(&self.replay)])?;
+            }
+        }
+        Ok(())
+    }
+
+    fn session_is_complete(&self) -> bool {
+        let sufficient = self.config.queries.sufficient_fraction;
+        self.session
+            .as_ref()
+            .is_some_and(|s| s.is_complete(&self.preferences, sufficient))
+    }
+
+    fn stands_still(&self) -> bool {
+        let has_steps_left = self.progress.step < self.config.training.total_steps;
+        let waits = self.config.training.while_waiting == WhileWaiting::Pause || !has_steps_left;
+        self.is_paused || (self.session.is_some() && waits)
+    }
+
+    fn asks_now(&self) -> bool {
+        let n_answers = self.preferences.n_preferred();
+        self.method.sampler.is_some()
+            && self.session.is_none()
+            && self
+                .config
+                .feedback
+                .is_due(self.progress.n_sessions, self.progress.step, n_answers)
+            && !self.replay.complete_episodes().is_empty()
+    }
+
+    /// Chooses a session's queries, makes them durable, and asks.
+    fn ask(
+        &mut self,
+        teacher: &mut dyn Teacher,
+        events: &mut dyn FnMut(Event),
+    ) -> Result<(), RunError> {
+        let index = self.progress.n_sessions;
+        self.demonstrate(Some(index), events)?;
+        let size = self
+            .config
+            .feedback
+            .session_size(self.preferences.n_preferred());
+        let queries = &self.config.queries;
+        let mut rng = Rng::new(self.config.seed, Stream::Candidates, u64::from(index));
+        let n_candidates = (size * queries.candidates_per_query) as usize;
+        let segment_len = self.config.segment_len(&self.spec);
+        let candidates = candidates::draw(
+            &self.replay,
+            queries.newest_episodes,
+            segment_len,
+            n_candidates,
+            &mut rng,
+        );
+        let sampler: &dyn QuerySampler = match &self.method.sampler {
+            Some(sampler) if self.progress.n_fits > 0 => sampler.as_ref(),
+            _ => &Uniform, // nothing is believed before the first fit
+        };
+        let mut beliefs = LearnedBeliefs {
+            replay: &self.replay,
+            reward: &self.learner.reward,
+            temporal: self.learner.temporal.as_ref(),
+        };
+        let selection = Selection {
+            index,
+            size,
+            seed: self.config.seed,
+            same_stage_fraction: queries.same_stage_fraction,
+            candidates: &candidates,
+        };
+        let session = Session::choose(&selection, sampler, &mut beliefs);
+        let report = session.report(self.progress.step, &candidates, &mut beliefs, &self.replay);
+        for planned in session.planned() {
+            self.preferences.ask(planned.key(), planned.query());
+        }
+        self.session = Some(session);
+        self.progress.n_sessions += 1;
+        self.say(Event::SessionOffered(report), events)?;
+        self.checkpoint_and_say(events)?;
+        self.offer_open_queries(teacher)
+    }
+
+    /// Fits the reward to all answers and relabels the replay.
+    fn learn_from_session(&mut self, events: &mut dyn FnMut(Event)) -> Result<(), RunError> {
+        let Some(session) = self.session.take() else {
+            return Ok(());
+        };
+        let labeled = self.preferences.labeled(self.config.queries.train_on_equal);
+        let is_first = self.progress.n_fits == 0;
+        self.progress.n_fits += 1;
+        let fit = self.learner.reward.fit(&self.replay, &labeled);
+        self.learner.reward.relabel(&mut self.replay);
+        if is_first {
+            self.learner
+                .begin_preference_learning(&self.config, &self.replay);
+        }
+        let closed = SessionClosed {
+            session: session.index(),
+            step: self.progress.step,
+            labels: self.preferences.n_preferred(),
+            epochs: fit.n_epochs,
+            loss: f64::from(fit.loss),
+            accuracy: f64::from(fit.accuracy),
+        };
+        self.say(Event::SessionClosed(closed), events)
+    }
+
+    /// One control step in every environment, and the updates that are due beside it.
+    fn advance(&mut self, events: &mut dyn FnMut(Event)) -> Result<(), RunError> {
+        let before = self.progress.step;
+        let now = before + self.lanes.len() as u64;
+        let actions = self.actions(before);
+        let due = self.due(before, now);
+        let observations = self.lanes.observations().to_vec();
+        let has_reward = self.progress.n_fits > 0;
+        let (updates, steps, rewards) = self.learner.work(&due, &self.replay, |reward| {
+            let steps = self.lanes.step(&actions);
+            let learned = if has_reward {
+                reward.predict(&observations, &actions)
+            } else {
+                vec![0.0; self.lanes.len()]
+            };
+            (steps, learned)
+        });
+        let steps = steps?;
+        self.meter.record(&updates);
+        self.lanes
+            .store(&actions, &rewards, &steps, &mut self.replay);
+        self.progress.step = now;
+
+        if Every(self.config.training.metrics_every).is_crossed(before, now) {
+            let row = self
+                .meter
+                .row(now, self.preferences.n_preferred(), &self.replay);
+            self.say(Event::Metrics(row), events)?;
+        }
+        if Every(self.config.evaluation.every).is_crossed(before, now) {
+            self.evaluate(events)?;
+        }
+        if Every(self.config.training.checkpoint_every).is_crossed(before, now) {
+            self.checkpoint_and_say(events)?;
+        }
+        Ok(())
+    }
+
+    fn actions(&self, step: u64) -> Vec<f32> {
+        if step < self.config.training.seed_steps {
+            let mut rng = Rng::new(self.config.seed, Stream::Action, step);
+            let n = self.lanes.len() * self.spec.action_size;
+            (0..n).map(|_| rng.uniform_in(-1.0, 1.0) as f32).collect()
+        } else {
+            self.learner.act_exploring(self.lanes.observations(), step)
+        }
+    }
+
+    /// Which updates fall into the steps (before, now].
+    fn due(&self, before: u64, now: u64) -> Due {
+        let (t, is_asking) = (&self.config.training, self.method.sampler.is_some());
+        let is_exploring = is_asking && self.progress.n_fits == 0;
+        let has_target = !is_exploring || self.config.exploration.is_unsupervised;
+        let owed =
+            |step: u64| (step.saturating_sub(t.seed_steps) as f64 * t.updates_per_step) as u64;
+        Due {
+            n_updates: if has_target {
+                owed(now) - owed(before)
+            } else {
+                0
+            },
+            is_exploring,
+            reward: self.method.reward,
+            n_temporal: if self.method.learns_temporal_distance && self.progress.n_fits > 0 {
+                Every(self.config.temporal.update_every).n_crossed(before, now)
+            } else {
+                0
+            },
+        }
+    }
+
+    fn evaluate(&mut self, events: &mut dyn FnMut(Event)) -> Result<(), RunError> {
+        let trial = self.trial(self.config.evaluation.episodes)?;
+        self.progress.last_evaluation = Some((trial.success_rate(), trial.return_mean()));
+        let event = Event::Evaluation(Evaluation {
+            step: self.progress.step,
+            labels: self.preferences.n_preferred(),
+            episodes: self.config.evaluation.episodes,
+            success_rate: trial.success_rate(),
+            return_mean: trial.return_mean(),
+            return_std: trial.return_std(),
+            reward_correlation: self.reward_correlation(&trial),
+        });
+        self.say(event, events)
+    }
+
+    fn trial(&self, n_episodes: u32) -> Result<Trial, RunError> {
+        let mut policy = |observations: &[f32], _: u32| self.learner.act_mean(observations);
+        Ok(evaluate(self.task, n_episodes, HELD_OUT, &mut policy)?)
+    }
+
+    fn reward_correlation(&self, trial: &Trial) -> Option<f64> {
+        if self.progress.n_fits == 0 {
+            return None;
+        }
+        let learned = self
+            .learner
+            .reward
+            .predict(&trial.kept.observations, &trial.kept.actions);
+        let learned: Vec<f64> = learned.into_iter().map(f64::from).collect();
+        correlation(&learned, &trial.kept.task_rewards)
+    }
+
+    fn demonstrate(
+        &mut self,
+        session: Option<u32>,
+        events: &mut dyn FnMut(Event),
+    ) -> Result<(), RunError> {
+        let trial = self.trial(1)?;
+        events(Event::Demonstration(Demonstration {
+            session,
+            step: self.progress.step,
+            success: trial.success_rate() > 0.0,
+            task_return: trial.return_mean(),
+            poses: trial.poses,
+        }));
+        Ok(())
+    }
+
+    fn finish(&mut self, events: &mut dyn FnMut(Event)) -> Result<Outcome, RunError> {
+        let is_evaluated = self
+            .progress
+            .step
+            .is_multiple_of(self.config.evaluation.every.max(1));
+        if !is_evaluated || self.progress.last_evaluation.is_none() {
+            self.evaluate(events)?;
+        }
+        self.demonstrate(None, events)?;
+        let (success_rate, return_mean) = self.progress.last_evaluation.unwrap_or_default();
+        let finished = Finished {
+            step: self.progress.step,
+            labels: self.preferences.n_preferred(),
+            success_rate,
+            return_mean,
+            weights: self.learner.fingerprint(),
+        };
+        self.say(Event::Finished(finished.clone()), events)?;
+        self.checkpoint_and_say(events)?;
+        Ok(Outcome::Finished(finished))
+    }
+
+    fn checkpoint_and_say(&mut self, events: &mut dyn FnMut(Event)) -> Result<(), RunError> {
+        self.checkpoint()?;
+        let Progress {
+            step,
+            consumed_sequence,
+            ..
+        } = self.progress;
+        events(Event::Checkpointed(Checkpointed {
+            step,
+            consumed_sequence,
+        }));
+        Ok(())
+    }
+
+    fn checkpoint(&mut self) -> Result<(), RunError> {
+        let mut archive = Archive::new();
+        self.learner.save(&mut archive);
+        archive.put_json("config", &self.config.to_toml());
+        archive.put_json("lanes", &self.lanes.state());
+        archive.put_json("replay", &self.replay.sync(&self.folder.replay())?);
+        archive.put_json("preferences", &self.preferences);
+        archive.put_json("session", &self.session);
+        archive.put_json("progress", &self.progress);
+        archive.put_json("metrics_len", &self.folder.sync_metrics()?);
+        self.folder.save(self.progress.step, &archive)
+    }
+
+    fn say(&mut self, event: Event, events: &mut dyn FnMut(Event)) -> Result<(), RunError> {
+        self.folder.record(&event)?;
+        events(event);
+        Ok(())
+    }
+
+    fn say_activity(&mut self, events: &mut dyn FnMut(Event)) {
+        let activity = if self.is_paused {
+            Activity::Paused
+        } else if self.session.is_some() && self.stands_still() {
+            Activity::Asking
+        } else if self.progress.n_fits == 0 && self.method.sampler.is_some() {
+            Activity::Exploring
+        } else {
+            Activity::Learning
+        };
+        if !self
+            .meter
+            .is_time_to_say(self.last_activity != Some(activity))
+        {
+            return;
+        }
+        self.last_activity = Some(activity);
+        let next = self.config.feedback.step_of(self.progress.n_sessions);
+        let asks_again = self.method.sampler.is_some()
+            && self.preferences.n_preferred() < self.config.feedback.budget
+            && next < self.config.training.total_steps;
+        let until = if asks_again {
+            next
+        } else {
+            self.config.training.total_steps
+        };
+        events(Event::Phase(Phase {
+            activity,
+            step: self.progress.step,
+            total_steps: self.config.training.total_steps,
+            until_step: matches!(activity, Activity::Exploring | Activity::Learning)
+                .then_some(until),
+            session_answers: self.session.as_ref().map(|s| s.progress(&self.preferences)),
+        }));
+    }
+}
+
+fn shape(spec: &EnvSpec) -> ReplayShape {
+    ReplayShape {
+        observation: spec.observation_size,
+        action: spec.action_size,
+        pose: spec.pose_size,
+    }
+}

@@ -1,0 +1,260 @@
+//! Whole runs of the small task: what a run promises, and the direction of learning.
+
+use std::path::PathBuf;
+use std::sync::mpsc::channel;
+
+use domain::query::{OfferedQuery, QueryKey};
+use domain::teacher::{Answered, Oracle, Scripted, Teacher, TeacherError, judge};
+use lab::config::{Layers, RunConfig};
+use lab::message::{Activity, Command, Event};
+use lab::run::{Outcome, Run};
+
+/// A run's folder that goes when the test ends.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(name: &str) -> Self {
+        let path = std::env::temp_dir().join(format!("stair-lab-{name}-{}", std::process::id()));
+        let _ = std::fs::remove_dir_all(&path); // an earlier test run may have been killed
+        Self(path)
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0); // best effort: it is a temporary folder
+    }
+}
+
+/// A few seconds of everything: exploring, two sessions, temporal distance, evaluation.
+fn short() -> RunConfig {
+    let settings = [
+        "training.total_steps=1200",
+        "training.seed_steps=200",
+        "training.checkpoint_every=200",
+        "training.updates_after_reset=10",
+        "feedback.first_step=600",
+        "feedback.every=300",
+        "feedback.queries_per_session=5",
+        "feedback.budget=10",
+        "evaluation.every=600",
+        "evaluation.episodes=3",
+        "agent.hidden=[16, 16]",
+        "agent.batch=32",
+        "reward.hidden=[16, 16]",
+        "temporal.block_episodes=2",
+        "temporal.batch=32",
+        "environment.n_envs=2",
+    ];
+    resolve("stair", &[], &settings)
+}
+
+fn resolve(method: &str, presets: &[&str], settings: &[&str]) -> RunConfig {
+    let layers = Layers {
+        task: Some("go-fetch-return".into()),
+        method: Some(method.into()),
+        presets: presets.iter().map(ToString::to_string).collect(),
+        overrides: settings.iter().map(ToString::to_string).collect(),
+        file: None,
+    };
+    RunConfig::resolve(&layers).unwrap()
+}
+
+fn finished(outcome: Outcome) -> lab::message::Finished {
+    match outcome {
+        Outcome::Finished(finished) => finished,
+        Outcome::Stopped => panic!("nobody stopped the run"),
+    }
+}
+
+fn drive(run: &mut Run, teacher: &mut dyn Teacher) -> (Outcome, Vec<Event>) {
+    let (_sender, commands) = channel();
+    let mut events = Vec::new();
+    let outcome = run
+        .drive(teacher, &commands, &mut |event| events.push(event))
+        .unwrap();
+    (outcome, events)
+}
+
+fn uninterrupted(config: &RunConfig, name: &str) -> lab::message::Finished {
+    let folder = Folder::new(name);
+    let mut run = Run::start(config.clone(), &folder.0).unwrap();
+    finished(drive(&mut run, &mut Scripted::new(Box::new(Oracle), 0)).0)
+}
+
+#[test]
+fn a_run_stopped_again_and_again_ends_with_the_same_bits() {
+    let config = short();
+    let expected = uninterrupted(&config, "straight");
+    let folder = Folder::new("stopped");
+    drop(Run::start(config, &folder.0).unwrap());
+    for n_events in [3, 1, 7, 2, 5, 11, usize::MAX] {
+        let (mut run, complaints) = Run::resume(&folder.0).unwrap();
+        assert!(complaints.is_empty(), "{complaints:?}");
+        let mut teacher = Scripted::new(Box::new(Oracle), run.consumed_sequence());
+        let (sender, commands) = channel();
+        let mut n_seen = 0;
+        let stop_later = &mut |_: Event| {
+            n_seen += 1;
+            if n_seen == n_events {
+                sender.send(Command::Stop).unwrap();
+            }
+        };
+        if let Outcome::Finished(actual) = run.drive(&mut teacher, &commands, stop_later).unwrap() {
+            assert_eq!(actual.weights, expected.weights);
+            return;
+        }
+    }
+    panic!("the run did not finish");
+}
+
+#[test]
+fn another_seed_is_another_run_and_the_same_seed_the_same() {
+    let config = short();
+    let first = uninterrupted(&config, "same-1");
+    assert_eq!(first.weights, uninterrupted(&config, "same-2").weights);
+    let other = RunConfig { seed: 2, ..config };
+    assert_ne!(first.weights, uninterrupted(&other, "other").weights);
+}
+
+#[test]
+fn a_damaged_checkpoint_is_passed_over_for_the_one_before() {
+    let folder = Folder::new("damaged");
+    let config = short();
+    let expected = uninterrupted(&config, "undamaged");
+    let mut run = Run::start(config, &folder.0).unwrap();
+    let (sender, commands) = channel();
+    let mut n_seen = 0;
+    let stop_at_third_checkpoint = &mut |event: Event| {
+        n_seen += usize::from(matches!(event, Event::Checkpointed(_)));
+        if n_seen == 3 {
+            sender.send(Command::Stop).unwrap();
+        }
+    };
+    let mut teacher = Scripted::new(Box::new(Oracle), 0);
+    assert_eq!(
+        run.drive(&mut teacher, &commands, stop_at_third_checkpoint)
+            .unwrap(),
+        Outcome::Stopped
+    );
+    drop(run);
+    let names = std::fs::read_dir(&folder.0)
+        .unwrap()
+        .map(|e| e.unwrap().path());
+    let mut checkpoints: Vec<PathBuf> = names
+        .filter(|p| p.extension().is_some_and(|e| e == "stair"))
+        .collect();
+    checkpoints.sort();
+    let newest = checkpoints.last().unwrap();
+    let mut bytes = std::fs::read(newest).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    std::fs::write(newest, bytes).unwrap();
+
+    let (mut run, complaints) = Run::resume(&folder.0).unwrap();
+    assert_eq!(complaints.len(), 1, "{complaints:?}");
+    let mut teacher = Scripted::new(Box::new(Oracle), run.consumed_sequence());
+    assert_eq!(
+        finished(drive(&mut run, &mut teacher).0).weights,
+        expected.weights
+    );
+}
+
+/// Skips every third query, answers the others as the oracle does.
+struct Choosy {
+    oracle: Scripted,
+    skipped: Vec<QueryKey>,
+}
+
+impl Teacher for Choosy {
+    fn ask(&mut self, queries: &[OfferedQuery]) -> Result<(), TeacherError> {
+        let refused = queries
+            .iter()
+            .map(|q| q.key)
+            .filter(|key| key.index % 3 == 0);
+        self.skipped.extend(refused);
+        self.oracle.ask(queries)
+    }
+
+    fn collect(&mut self, after: u64) -> Result<Vec<Answered>, TeacherError> {
+        let answers = self.oracle.collect(after)?;
+        let refuse = |a: Answered| match self.skipped.contains(&a.key) {
+            true => Answered {
+                preference: None,
+                ..a
+            },
+            false => a,
+        };
+        Ok(answers.into_iter().map(refuse).collect())
+    }
+}
+
+#[test]
+fn a_skipped_query_is_replaced_and_uses_no_budget() {
+    let folder = Folder::new("choosy");
+    let mut run = Run::start(short(), &folder.0).unwrap();
+    let mut teacher = Choosy {
+        oracle: Scripted::new(Box::new(Oracle), 0),
+        skipped: Vec::new(),
+    };
+    let (outcome, _) = drive(&mut run, &mut teacher);
+    assert!(teacher.skipped.len() >= 4, "{:?}", teacher.skipped);
+    assert_eq!(finished(outcome).labels, 10);
+}
+
+/// Never answers.
+struct Silent;
+
+impl Teacher for Silent {
+    fn ask(&mut self, _queries: &[OfferedQuery]) -> Result<(), TeacherError> {
+        Ok(())
+    }
+    fn collect(&mut self, _after: u64) -> Result<Vec<Answered>, TeacherError> {
+        Ok(Vec::new())
+    }
+}
+
+#[test]
+fn a_run_stands_still_while_a_session_is_unanswered_and_says_so() {
+    let folder = Folder::new("silent");
+    let mut run = Run::start(short(), &folder.0).unwrap();
+    let (sender, commands) = channel();
+    let mut waiting = None;
+    let stop_when_asking = &mut |event: Event| {
+        if let Event::Phase(phase) = event
+            && phase.activity == Activity::Asking
+        {
+            waiting = Some(phase);
+            sender.send(Command::Stop).unwrap();
+        }
+    };
+    assert_eq!(
+        run.drive(&mut Silent, &commands, stop_when_asking).unwrap(),
+        Outcome::Stopped
+    );
+    let phase = waiting.unwrap();
+    assert_eq!((phase.step, phase.session_answers), (600, Some((0, 5))));
+}
+
+#[test]
+fn a_second_run_is_not_started_in_the_folder_of_the_first() {
+    let folder = Folder::new("occupied");
+    drop(Run::start(short(), &folder.0).unwrap());
+    let Err(error) = Run::start(short(), &folder.0) else {
+        panic!("it started")
+    };
+    assert!(error.to_string().contains("holds a run already"), "{error}");
+}
+
+/// The small task from 80 answers: the oracle's teach it, a coin's do not.
+#[test]
+fn answers_teach_the_task_and_a_coin_does_not() {
+    let success = |teacher: &str| {
+        let folder = Folder::new(teacher);
+        let config = resolve("stair", &["quick"], &["evaluation.every=0"]);
+        let mut run = Run::start(config, &folder.0).unwrap();
+        finished(drive(&mut run, &mut Scripted::new(judge(teacher, 1).unwrap(), 0)).0).success_rate
+    };
+    let (taught, untaught) = (success("oracle"), success("coin"));
+    assert!(taught > untaught + 0.3, "oracle {taught}, coin {untaught}");
+}
