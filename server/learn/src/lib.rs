@@ -1,1 +1,24 @@
-//! (to be written)
+//! Learns: the agent (SAC), the reward ensemble, the temporal distance and the drive to explore.
+//!
+//! Invariants: the only crate that touches tensors; randomness only from [`domain::random`], keyed
+//! by (seed, stream, step), so that every learner resumes bit for bit from what it saves; one
+//! thread per learner; a task reward reaches a learner only through
+//! [`replay::RewardSource::Task`], the upper bound's own road.
+
+pub mod beliefs;
+pub mod checkpoint;
+pub mod device;
+pub mod exploration;
+pub mod replay;
+pub mod reward;
+pub mod sac;
+pub mod temporal;
+
+mod adam;
+mod checksum;
+mod error;
+mod init;
+mod kernel;
+mod net;
+
+pub use error::LearnError;

@@ -1,0 +1,164 @@
+//! Where tensors live, and what the process needs before the first one.
+
+use std::sync::Once;
+use std::sync::atomic::{AtomicU8, AtomicU64, Ordering};
+
+use crate::error::LearnError;
+
+/// A place for tensors: the processor or a graphics card.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Device(pub(crate) tch::Device);
+
+impl Device {
+    /// The processor.
+    pub const CPU: Self = Self(tch::Device::Cpu);
+
+    /// Opens `cpu`, `cuda` (the first card) or `cuda:N`, and prepares the process ([`init`]).
+    ///
+    /// # Errors
+    /// [`LearnError::NoDevice`], with what can be had.
+    pub fn open(name: &str) -> Result<Self, LearnError> {
+        init();
+        let no_device = |reason: String| LearnError::NoDevice {
+            name: name.to_owned(),
+            reason,
+        };
+        let index = match name.split_once(':') {
+            None if name == "cpu" => return Ok(Self::CPU),
+            None if name == "cuda" => 0,
+            Some(("cuda", index)) => index
+                .parse::<usize>()
+                .map_err(|_| no_device(format!("{index:?} is no number of a card")))?,
+            _ => return Err(no_device("devices are `cpu`, `cuda` and `cuda:N`".into())),
+        };
+        let n_cards = usize::try_from(tch::Cuda::device_count()).unwrap_or(0);
+        if index >= n_cards {
+            return Err(no_device(format!(
+                "this libtorch sees {n_cards} CUDA cards; use `cpu`"
+            )));
+        }
+        Ok(Self(tch::Device::Cuda(index)))
+    }
+}
+
+/// Prepares the process once and every thread that calls it; calling it again does nothing.
+/// A thread that computes with tensors calls it first.
+///
+/// One tensor operation runs on one thread: what runs side by side does so on Rust threads
+/// (two threads inside one product gain 1.2×, and waiting ones spin). MKL keeps its number of
+/// threads for each thread apart, so a new thread would start with one for each core. Freed
+/// memory of up to 32 MiB a block is kept, because giving it back and faulting it in again
+/// costs more than the arithmetic on it.
+pub fn init() {
+    static ONCE: Once = Once::new();
+    ONCE.call_once(keep_freed_memory);
+    thread_local! {
+        static IS_ALONE: () = tch::set_num_threads(1);
+    }
+    IS_ALONE.with(|()| ());
+}
+
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+#[expect(
+    unsafe_code,
+    reason = "glibc's allocator is tuned through a C function"
+)]
+fn keep_freed_memory() {
+    const M_TRIM_THRESHOLD: i32 = -1;
+    const M_TOP_PAD: i32 = -2;
+    const M_MMAP_THRESHOLD: i32 = -3;
+    const MIB: i32 = 1 << 20;
+    unsafe extern "C" {
+        fn mallopt(parameter: i32, value: i32) -> i32;
+    }
+    // SAFETY: mallopt takes plain numbers and refuses what it does not know.
+    unsafe {
+        mallopt(M_MMAP_THRESHOLD, 32 * MIB); // the largest that glibc takes
+        mallopt(M_TRIM_THRESHOLD, 512 * MIB);
+        mallopt(M_TOP_PAD, 16 * MIB);
+    }
+}
+
+#[cfg(not(all(target_os = "linux", target_env = "gnu")))]
+fn keep_freed_memory() {}
+
+static N_SWITCH_CALLS: AtomicU64 = AtomicU64::new(0);
+
+/// How often MKL has asked the switch below; zero after a matrix product means that the
+/// executable was linked without `rpath.rs`, and that products run at half speed on AMD.
+pub fn n_mkl_switch_calls() -> u64 {
+    N_SWITCH_CALLS.load(Ordering::Relaxed)
+}
+
+/// Whether MKL may take its fastest path on this processor.
+///
+/// MKL calls this symbol to learn whether it runs on Intel's own processors; the executable's
+/// answer wins over the library's. Without it, MKL leaves AVX-512 unused on AMD (90–97 instead
+/// of 203–216 GF/s a Zen5 core). Unsupported by Intel, hence a switch: `STAIR_MKL_SWITCH=0`
+/// gives the library's own answer back, and processors without AVX2 and FMA always get it.
+#[unsafe(no_mangle)]
+#[expect(unsafe_code, reason = "MKL looks the symbol up by its C name")]
+pub extern "C" fn mkl_serv_intel_cpu_true() -> i32 {
+    const UNKNOWN: u8 = 2;
+    static ANSWER: AtomicU8 = AtomicU8::new(UNKNOWN);
+    N_SWITCH_CALLS.fetch_add(1, Ordering::Relaxed);
+    let mut answer = ANSWER.load(Ordering::Relaxed);
+    if answer == UNKNOWN {
+        answer = u8::from(is_intel() || (is_switched_on() && has_fused_multiply_add()));
+        ANSWER.store(answer, Ordering::Relaxed);
+    }
+    i32::from(answer)
+}
+
+fn is_switched_on() -> bool {
+    std::env::var_os("STAIR_MKL_SWITCH").is_none_or(|value| value != "0")
+}
+
+#[cfg(target_arch = "x86_64")]
+fn has_fused_multiply_add() -> bool {
+    std::is_x86_feature_detected!("avx2") && std::is_x86_feature_detected!("fma")
+}
+
+#[cfg(target_arch = "x86_64")]
+fn is_intel() -> bool {
+    let vendor = std::arch::x86_64::__cpuid(0);
+    let name = [vendor.ebx, vendor.edx, vendor.ecx].map(u32::to_le_bytes);
+    name.concat() == b"GenuineIntel"
+}
+
+#[cfg(not(target_arch = "x86_64"))]
+fn has_fused_multiply_add() -> bool {
+    false
+}
+
+#[cfg(not(target_arch = "x86_64"))]
+fn is_intel() -> bool {
+    false
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn mkl_asks_the_switch_of_this_executable() {
+        init();
+        let a = tch::Tensor::ones([64, 64], (tch::Kind::Float, tch::Device::Cpu));
+        let product = a.matmul(&a);
+        assert!((product.double_value(&[3, 5]) - 64.0).abs() < 1e-6);
+        assert!(n_mkl_switch_calls() > 0, "linked without rpath.rs");
+    }
+
+    #[test]
+    fn new_threads_compute_alone_too() {
+        init();
+        let n_threads = std::thread::spawn(tch::get_num_threads).join();
+        assert_eq!(n_threads.expect("the thread returns"), 1);
+    }
+
+    #[test]
+    fn an_unknown_device_is_named() {
+        let error = Device::open("tpu").expect_err("no such device").to_string();
+        assert!(error.contains("tpu") && error.contains("cuda"), "{error}");
+    }
+}

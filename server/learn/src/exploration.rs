@@ -1,0 +1,245 @@
+//! Novelty as a reward, for exploring before anybody has been asked.
+
+use serde::{Deserialize, Serialize};
+use tch::Tensor;
+
+use crate::checkpoint::Archive;
+use crate::error::LearnError;
+use crate::kernel;
+use crate::replay::Replay;
+
+/// Settings of unsupervised exploration.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ExplorationConfig {
+    /// Whether the agent learns from novelty until the first session.
+    pub is_unsupervised: bool,
+    /// Which nearest neighbour the novelty is measured to, not counting the state itself.
+    pub neighbours: usize,
+    /// Whether the running standard deviation carries the slip of all BPref forks: the mean
+    /// moves by δ + n_b/n instead of δ·n_b/n, which shrinks early novelty several times.
+    pub bpref_running_std: bool,
+}
+
+impl Default for ExplorationConfig {
+    fn default() -> Self {
+        Self {
+            is_unsupervised: true,
+            neighbours: 5,
+            bpref_running_std: false,
+        }
+    }
+}
+
+/// States compared at once: their distances stay in the cache.
+const CHUNK_STATES: usize = 512;
+
+/// Distance to the k-th nearest visited state over its running standard deviation.
+///
+/// Source: PEBBLE, §4.1, as in BPref's code: no logarithm, no mean subtracted.
+pub struct StateEntropy {
+    config: ExplorationConfig,
+    running: RunningStd,
+}
+
+impl StateEntropy {
+    /// With nothing seen.
+    pub fn new(config: &ExplorationConfig) -> Self {
+        crate::device::init();
+        Self {
+            config: config.clone(),
+            running: RunningStd::new(),
+        }
+    }
+
+    /// Novelty of a batch of states `[B × S]` from the replay against all states in it, `[B]`.
+    pub fn intrinsic(&mut self, batch_observations: &[f32], replay: &Replay) -> Vec<f32> {
+        let size = replay.shape().observation;
+        let distances = neighbour_distances(
+            batch_observations,
+            size,
+            replay.visited_states(),
+            self.config.neighbours,
+        );
+        self.running
+            .update(&distances, self.config.bpref_running_std);
+        let std = self.running.variance.sqrt();
+        distances
+            .iter()
+            .map(|d| (f64::from(*d) / std) as f32)
+            .collect()
+    }
+
+    /// The running moments.
+    pub fn save(&self, archive: &mut Archive) {
+        let RunningStd {
+            mean,
+            variance,
+            count,
+        } = self.running;
+        archive.put_f64("exploration", &[mean, variance, count]);
+    }
+
+    /// What [`StateEntropy::save`] wrote.
+    ///
+    /// # Errors
+    /// When the section is missing.
+    pub fn load(&mut self, archive: &Archive) -> Result<(), LearnError> {
+        let [mean, variance, count] = archive.f64("exploration")?;
+        self.running = RunningStd {
+            mean,
+            variance,
+            count,
+        };
+        Ok(())
+    }
+}
+
+/// Distance of each of `queries` to its k-th nearest of `states` beside itself (the (k+1)-th
+/// smallest distance; 0 while there are fewer states).
+///
+/// Products find the neighbours (|x|² − 2xy), whose distances are then computed from the
+/// differences: near ones lose no digits.
+fn neighbour_distances<'a>(
+    queries: &[f32],
+    size: usize,
+    states: impl Iterator<Item = &'a [f32]>,
+    k: usize,
+) -> Vec<f32> {
+    let n_queries = queries.len() / size;
+    let mut nearest: Vec<Nearest> = (0..n_queries).map(|_| Nearest::new(k + 1)).collect();
+    let doubled: Vec<f32> = queries.iter().map(|x| -2.0 * x).collect();
+    let doubled = Tensor::from_slice(&doubled).view([n_queries as i64, size as i64]);
+    let mut chunk: Vec<f32> = Vec::with_capacity(CHUNK_STATES * size);
+    let mut compare = |chunk: &[f32]| {
+        let states = Tensor::from_slice(chunk).view([-1, size as i64]);
+        let squares: Vec<f32> = chunk
+            .chunks_exact(size)
+            .map(|s| s.iter().map(|x| x * x).sum())
+            .collect();
+        let keys = Tensor::from_slice(&squares).addmm(&doubled, &states.transpose(0, 1));
+        let rows = kernel::values::<f32>(&keys).chunks_exact(squares.len());
+        for ((nearest, keys), query) in nearest.iter_mut().zip(rows).zip(queries.chunks_exact(size))
+        {
+            nearest.take(keys, query, chunk);
+        }
+    };
+    for mut episode in states {
+        while !episode.is_empty() {
+            let room = CHUNK_STATES * size - chunk.len();
+            let (own, rest) = episode.split_at(room.min(episode.len()));
+            chunk.extend_from_slice(own);
+            episode = rest;
+            if chunk.len() == CHUNK_STATES * size {
+                compare(&chunk);
+                chunk.clear();
+            }
+        }
+    }
+    if !chunk.is_empty() {
+        compare(&chunk);
+    }
+    nearest.iter().map(|n| n.last_distance()).collect()
+}
+
+/// The smallest keys of one query so far, ascending, with their true squared distances.
+struct Nearest {
+    n: usize,
+    keys: Vec<(f32, f32)>,
+}
+
+impl Nearest {
+    fn new(n: usize) -> Self {
+        Self {
+            n,
+            keys: Vec::with_capacity(n + 1),
+        }
+    }
+
+    fn take(&mut self, keys: &[f32], query: &[f32], states: &[f32]) {
+        const STRIP: usize = 16;
+        let size = query.len();
+        for (strip, own) in keys.chunks(STRIP).enumerate() {
+            let mut bound = self.bound();
+            if own.iter().all(|key| *key >= bound) {
+                continue;
+            }
+            for (place, &key) in own.iter().enumerate() {
+                if key < bound {
+                    let at = (strip * STRIP + place) * size;
+                    let square = query
+                        .iter()
+                        .zip(&states[at..at + size])
+                        .map(|(a, b)| (a - b) * (a - b))
+                        .sum();
+                    self.insert(key, square);
+                    bound = self.bound();
+                }
+            }
+        }
+    }
+
+    fn bound(&self) -> f32 {
+        if self.keys.len() < self.n {
+            f32::INFINITY
+        } else {
+            self.keys[self.n - 1].0
+        }
+    }
+
+    fn insert(&mut self, key: f32, square: f32) {
+        let place = self.keys.partition_point(|(other, _)| *other <= key);
+        self.keys.insert(place, (key, square));
+        self.keys.truncate(self.n);
+    }
+
+    fn last_distance(&self) -> f32 {
+        if self.keys.len() < self.n {
+            return 0.0;
+        }
+        self.keys
+            .iter()
+            .map(|(_, square)| *square)
+            .fold(0.0, f32::max)
+            .sqrt()
+    }
+}
+
+/// Moments over everything seen (Chan's parallel update), started with a variance of 1 that
+/// counts 1e-4.
+#[derive(Debug, Clone, Copy)]
+struct RunningStd {
+    mean: f64,
+    variance: f64,
+    count: f64,
+}
+
+impl RunningStd {
+    fn new() -> Self {
+        Self {
+            mean: 0.0,
+            variance: 1.0,
+            count: 1e-4,
+        }
+    }
+
+    fn update(&mut self, values: &[f32], has_bpref_slip: bool) {
+        let n = values.len() as f64;
+        if values.is_empty() {
+            return;
+        }
+        let mean = values.iter().copied().map(f64::from).sum::<f64>() / n;
+        let square = |v: &f32| (f64::from(*v) - mean).powi(2);
+        let variance = values.iter().map(square).sum::<f64>() / (n - 1.0).max(1.0);
+        let (delta, total) = (mean - self.mean, self.count + n);
+        let squares =
+            self.variance * self.count + variance * n + delta * delta * self.count * n / total;
+        self.mean += if has_bpref_slip {
+            delta + n / total
+        } else {
+            delta * n / total
+        };
+        self.variance = squares / total;
+        self.count = total;
+    }
+}

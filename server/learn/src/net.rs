@@ -1,0 +1,336 @@
+//! Stacked multilayer perceptrons whose weights are views of one flat vector.
+//!
+//! Members that share a shape are computed together; Adam, averaging, saving and loading see
+//! the flat vector only. The way back is written out, because autograd's bookkeeping and its
+//! temporaries cost as much as a third of an update at these sizes.
+
+use std::ops::Range;
+
+use tch::{Device, Kind, Tensor};
+
+use crate::adam::Adam;
+use crate::checkpoint::Archive;
+use crate::error::LearnError;
+use crate::kernel::{self, NormGradient, Normed};
+
+/// Form of a stack of perceptrons.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct NetShape {
+    /// Perceptrons of this shape, `E`.
+    pub(crate) n_members: i64,
+    /// Numbers in the input, each hidden layer, the output.
+    pub(crate) sizes: Vec<i64>,
+    /// Of the activation for negative numbers; 0 is ReLU.
+    pub(crate) slope: f64,
+    /// Whether hidden layers are normalised before the activation.
+    pub(crate) layer_norm: bool,
+}
+
+impl NetShape {
+    /// `input → hidden… → output`, ReLU, not normalised.
+    pub(crate) fn new(n_members: i64, input: i64, hidden: &[i64], output: i64) -> Self {
+        let sizes = [&[input], hidden, &[output]].concat();
+        Self {
+            n_members,
+            sizes,
+            slope: 0.0,
+            layer_norm: false,
+        }
+    }
+
+    /// Weights of all members.
+    pub(crate) fn n_values(&self) -> i64 {
+        let last = self.sizes.len() - 2;
+        let layer = |(i, pair): (usize, &[i64])| {
+            let n_vectors = if self.layer_norm && i < last { 3 } else { 1 };
+            pair[0] * pair[1] + n_vectors * pair[1]
+        };
+        self.n_members * self.sizes.windows(2).enumerate().map(layer).sum::<i64>()
+    }
+}
+
+/// One layer of all members, views.
+#[derive(Debug)]
+pub(crate) struct Layer {
+    /// `[E × in × out]`.
+    pub(crate) weight: Tensor,
+    /// `[E × 1 × out]`.
+    pub(crate) bias: Tensor,
+    norm: Option<Norm>,
+}
+
+#[derive(Debug)]
+struct Norm {
+    gain: Tensor,
+    shift: Tensor,
+}
+
+impl Layer {
+    /// Normalisation that changes nothing yet.
+    pub(crate) fn init_norm(&mut self) {
+        if let Some(norm) = &mut self.norm {
+            let _ = norm.gain.fill_(1.0);
+            let _ = norm.shift.zero_();
+        }
+    }
+}
+
+/// A stack of perceptrons (or, over another vector, the gradients of one).
+#[derive(Debug)]
+pub(crate) struct Net {
+    layers: Vec<Layer>,
+    slope: f64,
+}
+
+/// What a forward pass leaves for the way back.
+#[derive(Debug)]
+pub(crate) struct Tape {
+    input: Tensor,
+    hidden: Vec<Hidden>,
+}
+
+#[derive(Debug)]
+struct Hidden {
+    output: Tensor,
+    /// Normalised rows and 1/σ.
+    normed: Option<(Tensor, Tensor)>,
+}
+
+impl Net {
+    /// Views of `flat` from `offset` on.
+    pub(crate) fn over(shape: &NetShape, flat: &Tensor, offset: i64) -> Self {
+        let mut offset = offset;
+        let mut view = |size: [i64; 3]| {
+            let len = size.iter().product();
+            let view = flat.narrow(0, offset, len).view(size);
+            offset += len;
+            view
+        };
+        let (e, last) = (shape.n_members, shape.sizes.len() - 2);
+        let layer = |(i, pair): (usize, &[i64])| Layer {
+            weight: view([e, pair[0], pair[1]]),
+            bias: view([e, 1, pair[1]]),
+            norm: (shape.layer_norm && i < last).then(|| Norm {
+                gain: view([e, 1, pair[1]]),
+                shift: view([e, 1, pair[1]]),
+            }),
+        };
+        let layers = shape.sizes.windows(2).enumerate().map(layer).collect();
+        Self {
+            layers,
+            slope: shape.slope,
+        }
+    }
+
+    /// From the input on.
+    pub(crate) fn layers_mut(&mut self) -> &mut [Layer] {
+        &mut self.layers
+    }
+
+    /// Outputs `[E × B × out]` for inputs `[B × in]`, shared by the members, or `[E × B × in]`.
+    pub(crate) fn forward(&self, input: &Tensor) -> Tensor {
+        self.run(input, |_| ()).0
+    }
+
+    /// The same, keeping what the way back needs.
+    pub(crate) fn forward_taped(&self, input: &Tensor) -> (Tensor, Tape) {
+        let mut hidden = Vec::with_capacity(self.layers.len() - 1);
+        let (output, input) = self.run(input, |h| hidden.push(h));
+        (output, Tape { input, hidden })
+    }
+
+    fn run(&self, input: &Tensor, mut keep: impl FnMut(Hidden)) -> (Tensor, Tensor) {
+        let input = self.expanded(input);
+        let mut x = input.shallow_clone();
+        let (last, hidden) = self.layers.split_last().expect("a net has layers");
+        for layer in hidden {
+            let mut z = x.bmm(&layer.weight);
+            let normed = match &layer.norm {
+                None => {
+                    kernel::bias_activate(&mut z, &layer.bias, self.slope);
+                    x = z;
+                    None
+                }
+                Some(norm) => {
+                    let (output, inverse) = kernel::norm_activate(
+                        &mut z,
+                        &layer.bias,
+                        (&norm.gain, &norm.shift),
+                        self.slope,
+                    );
+                    x = output;
+                    Some((z, inverse))
+                }
+            };
+            keep(Hidden {
+                output: x.shallow_clone(),
+                normed,
+            });
+        }
+        let mut z = x.bmm(&last.weight);
+        kernel::bias_activate(&mut z, &last.bias, 1.0);
+        (z, input)
+    }
+
+    fn expanded(&self, input: &Tensor) -> Tensor {
+        match input.size()[..] {
+            [rows, columns] => input
+                .unsqueeze(0)
+                .expand([self.layers[0].weight.size()[0], rows, columns], false),
+            _ => input.shallow_clone(),
+        }
+    }
+
+    /// The way back. Adds the weights' gradients to `into`, and returns the gradient of the
+    /// input's `columns`, `[E × B × columns]`, where they are asked for.
+    pub(crate) fn backward(
+        &self,
+        tape: &Tape,
+        output_gradient: Tensor,
+        mut into: Option<&mut Net>,
+        columns: Option<Range<i64>>,
+    ) -> Option<Tensor> {
+        let mut gradient = output_gradient;
+        for (index, layer) in self.layers.iter().enumerate().rev() {
+            let mut into = into.as_deref_mut().map(|net| &mut net.layers[index]);
+            if let Some(hidden) = tape.hidden.get(index) {
+                self.activation_backward(&mut gradient, hidden, layer, into.as_deref_mut());
+            } else if let Some(into) = &mut into {
+                let _ = into
+                    .bias
+                    .g_add_(&gradient.sum_dim_intlist([1_i64].as_slice(), true, None));
+            }
+            if let Some(into) = into {
+                let x = index
+                    .checked_sub(1)
+                    .map_or(&tape.input, |before| &tape.hidden[before].output);
+                let _ = into.weight.baddbmm_(&x.transpose(1, 2), &gradient);
+            }
+            if index > 0 {
+                gradient = gradient.bmm(&layer.weight.transpose(1, 2));
+            }
+        }
+        let columns = columns?;
+        let weight = self.layers[0]
+            .weight
+            .narrow(1, columns.start, columns.end - columns.start);
+        Some(gradient.bmm(&weight.transpose(1, 2)))
+    }
+
+    fn activation_backward(
+        &self,
+        gradient: &mut Tensor,
+        hidden: &Hidden,
+        layer: &Layer,
+        into: Option<&mut Layer>,
+    ) {
+        let (Some(norm), Some((normalised, inverse))) = (&layer.norm, &hidden.normed) else {
+            let bias = into.map(|into| &mut into.bias);
+            kernel::bias_activate_backward(gradient, &hidden.output, self.slope, bias);
+            return;
+        };
+        let forward = Normed {
+            output: &hidden.output,
+            normalised,
+            inverse,
+            gain: &norm.gain,
+        };
+        let into = into.and_then(|into| {
+            let norm = into.norm.as_mut()?;
+            Some(NormGradient {
+                bias: &mut into.bias,
+                gain: &mut norm.gain,
+                shift: &mut norm.shift,
+            })
+        });
+        kernel::norm_activate_backward(gradient, &forward, self.slope, into);
+    }
+}
+
+/// A flat vector that is trained: values, gradient, moments.
+#[derive(Debug)]
+pub(crate) struct Parameters {
+    /// What nets are views of.
+    pub(crate) values: Tensor,
+    /// What gradient nets are views of.
+    pub(crate) gradient: Tensor,
+    adam: Adam,
+}
+
+impl Parameters {
+    pub(crate) fn new(n_values: i64, learning_rate: f64, options: (Kind, Device)) -> Self {
+        Self {
+            values: Tensor::zeros([n_values], options),
+            gradient: Tensor::zeros([n_values], options),
+            adam: Adam::new(n_values, learning_rate, options),
+        }
+    }
+
+    /// Forgets the gradient.
+    pub(crate) fn zero_gradient(&mut self) {
+        let _ = self.gradient.zero_();
+    }
+
+    /// One Adam step along the gradient.
+    pub(crate) fn step(&mut self) {
+        self.adam.step(&mut self.values, &self.gradient, 1.0);
+    }
+
+    /// One Adam step along the gradient, scaled down to a norm of at most `max_norm`; returns
+    /// the norm before.
+    pub(crate) fn step_clipped(&mut self, max_norm: f64) -> f64 {
+        let norm = self.gradient.norm().double_value(&[]);
+        let scale = (max_norm / (norm + 1e-6)).min(1.0);
+        self.adam.step(&mut self.values, &self.gradient, scale);
+        norm
+    }
+
+    /// Forgets the moments: for fresh weights.
+    pub(crate) fn reset_moments(&mut self) {
+        self.adam.reset();
+    }
+
+    /// Values, moments and count of steps, as sections `name`, `name.adam…`.
+    pub(crate) fn save(&self, name: &str, archive: &mut Archive) {
+        save_tensor(&self.values, name, archive);
+        self.adam.save(name, archive);
+    }
+
+    /// What [`Parameters::save`] wrote.
+    pub(crate) fn load(&mut self, name: &str, archive: &Archive) -> Result<(), LearnError> {
+        load_tensor(&mut self.values, name, archive)?;
+        self.adam.load(name, archive)
+    }
+}
+
+/// A flat tensor as a section.
+pub(crate) fn save_tensor(tensor: &Tensor, name: &str, archive: &mut Archive) {
+    archive.put_f32(name, to_vec(tensor), &tensor.size());
+}
+
+/// A section into a flat tensor of the same shape, in place: views of it stay valid.
+pub(crate) fn load_tensor(
+    tensor: &mut Tensor,
+    name: &str,
+    archive: &Archive,
+) -> Result<(), LearnError> {
+    let values = archive.f32(name, &tensor.size())?;
+    tensor.copy_(&Tensor::from_slice(values).view_as(tensor));
+    Ok(())
+}
+
+/// A tensor's numbers, row-major, on any device.
+pub(crate) fn to_vec(tensor: &Tensor) -> Vec<f32> {
+    let tensor = tensor
+        .to_device(Device::Cpu)
+        .to_kind(Kind::Float)
+        .contiguous();
+    kernel::values::<f32>(&tensor).to_vec()
+}
+
+/// Numbers as a `[rows × columns]` tensor.
+pub(crate) fn matrix(values: &[f32], columns: i64, options: (Kind, Device)) -> Tensor {
+    let rows = values.len() as i64 / columns;
+    let tensor = Tensor::from_slice(values).view([rows, columns]);
+    tensor.to_kind(options.0).to_device(options.1)
+}

@@ -1,0 +1,397 @@
+//! The reward ensemble: per-step rewards learned from preferences between segments.
+
+use domain::answer::Preference;
+use domain::episode::Segment;
+use domain::query::Query;
+use domain::random::{Rng, Stream};
+use serde::{Deserialize, Serialize};
+use tch::{Kind, Tensor};
+
+use crate::checkpoint::Archive;
+use crate::device::Device;
+use crate::error::LearnError;
+use crate::init;
+use crate::net::{Net, NetShape, Parameters, matrix, to_vec};
+use crate::replay::Replay;
+
+/// Settings of the ensemble. Defaults: the released settings for MetaWorld.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct RewardConfig {
+    /// Members, `M`.
+    pub members: usize,
+    /// Hidden layers of each.
+    pub hidden: Vec<i64>,
+    /// Adam's rate.
+    ///
+    /// Differs from the paper: its table says 1e-4, the released code uses 3e-4.
+    pub learning_rate: f64,
+    /// Pairs in a minibatch.
+    pub batch: usize,
+    /// Passes over all preferences after a session, at most.
+    pub max_epochs: u32,
+    /// Fitting stops after a pass in which this share of the preferences was right, mean over
+    /// members.
+    pub stop_accuracy: f32,
+}
+
+impl Default for RewardConfig {
+    fn default() -> Self {
+        Self {
+            members: 3,
+            hidden: vec![256; 3],
+            learning_rate: 3e-4,
+            batch: 128,
+            max_epochs: 10,
+            stop_accuracy: 0.97,
+        }
+    }
+}
+
+/// A query with what was preferred.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Labeled {
+    /// References into the replay.
+    pub query: Query,
+    /// Of the two segments.
+    pub preference: Preference,
+}
+
+/// What fitting did.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct RewardFit {
+    /// Passes over all preferences.
+    pub n_epochs: u32,
+    /// Cross-entropy of the last pass, nats, mean over members.
+    pub loss: f32,
+    /// Share that was right during the last pass, mean over members; equal preferences, which
+    /// cannot be right, are left out.
+    pub accuracy: f32,
+}
+
+/// Of `LeakyReLU`, as PyTorch's default.
+const SLOPE: f64 = 0.01;
+/// Rows that are computed at once, per member: their hidden layers stay in the cache.
+const CHUNK_ROWS: usize = 2_048;
+
+/// Several reward models of one form, trained side by side on the same preferences.
+pub struct RewardEnsemble {
+    config: RewardConfig,
+    seed: u64,
+    options: (Kind, tch::Device),
+    columns: i64,
+    parameters: Parameters,
+    net: Net,
+    gradient: Net,
+    n_epochs: u64,
+}
+
+/// One member's order of the preferences in an epoch, and how it did.
+struct Pass {
+    order: Vec<usize>,
+    loss: f64,
+    n_right: u32,
+    n_judged: u32,
+}
+
+impl RewardEnsemble {
+    /// Fresh weights that follow from `seed`.
+    pub fn new(
+        config: &RewardConfig,
+        observation_size: usize,
+        action_size: usize,
+        seed: u64,
+        device: Device,
+    ) -> Self {
+        let sizes = (observation_size, action_size);
+        Self::with_kind(config, sizes, seed, (Kind::Float, device.0))
+    }
+
+    fn with_kind(
+        config: &RewardConfig,
+        sizes: (usize, usize),
+        seed: u64,
+        options: (Kind, tch::Device),
+    ) -> Self {
+        crate::device::init();
+        let columns = (sizes.0 + sizes.1) as i64;
+        let shape = NetShape {
+            slope: SLOPE,
+            ..NetShape::new(config.members as i64, columns, &config.hidden, 1)
+        };
+        let parameters = Parameters::new(shape.n_values(), config.learning_rate, options);
+        let mut net = Net::over(&shape, &parameters.values, 0);
+        init::uniform(&mut net, &mut Rng::new(seed, Stream::Weights, FIRST_KEY));
+        Self {
+            config: config.clone(),
+            seed,
+            options,
+            columns,
+            gradient: Net::over(&shape, &parameters.gradient, 0),
+            parameters,
+            net,
+            n_epochs: 0,
+        }
+    }
+
+    /// Goes on from the present weights, over all preferences so far, until the members are
+    /// right often enough or the passes are used up.
+    ///
+    /// Each member sees the preferences in its own order. The loss is the cross-entropy of
+    /// P(second ≻ first) = σ(Σ r(second) − Σ r(first)) to 0, 1, or ½ for equal, mean over a
+    /// minibatch, summed over members.
+    ///
+    /// Source: BPref's `train_soft_reward` without smoothing. Differs from the code: equal
+    /// preferences need no global switch.
+    ///
+    /// # Panics
+    /// When a segment is not in the replay.
+    pub fn fit(&mut self, replay: &Replay, labeled: &[Labeled]) -> RewardFit {
+        let mut fit = RewardFit::default();
+        if labeled.is_empty() {
+            return fit;
+        }
+        for _ in 0..self.config.max_epochs {
+            let passes = self.epoch(replay, labeled);
+            let mean = |value: &dyn Fn(&Pass) -> f64| {
+                passes.iter().map(value).sum::<f64>() / passes.len() as f64
+            };
+            fit.n_epochs += 1;
+            fit.loss = mean(&|p| p.loss / labeled.len() as f64) as f32;
+            fit.accuracy = mean(&|p| f64::from(p.n_right) / f64::from(p.n_judged.max(1))) as f32;
+            if fit.accuracy > self.config.stop_accuracy {
+                break;
+            }
+        }
+        fit
+    }
+
+    fn epoch(&mut self, replay: &Replay, labeled: &[Labeled]) -> Vec<Pass> {
+        let mut rng = Rng::new(self.seed, Stream::RewardFit, self.n_epochs);
+        self.n_epochs += 1;
+        let pass = |_| Pass {
+            order: rng.permutation(labeled.len()),
+            loss: 0.0,
+            n_right: 0,
+            n_judged: 0,
+        };
+        let mut passes: Vec<Pass> = (0..self.config.members).map(pass).collect();
+        for start in (0..labeled.len()).step_by(self.config.batch) {
+            let end = labeled.len().min(start + self.config.batch);
+            self.minibatch(replay, labeled, &mut passes, start..end);
+        }
+        passes
+    }
+
+    /// One Adam step on a range of each member's order. The loss is a sum over pairs, so a few
+    /// pairs at a time go forward and back while their hidden layers are in the cache.
+    fn minibatch(
+        &mut self,
+        replay: &Replay,
+        labeled: &[Labeled],
+        passes: &mut [Pass],
+        range: std::ops::Range<usize>,
+    ) {
+        self.gradient(replay, labeled, passes, range);
+        self.parameters.step();
+    }
+
+    fn gradient(
+        &mut self,
+        replay: &Replay,
+        labeled: &[Labeled],
+        passes: &mut [Pass],
+        range: std::ops::Range<usize>,
+    ) {
+        self.parameters.zero_gradient();
+        let longest = labeled.iter().map(|l| longest(&l.query)).max().unwrap_or(1);
+        let pairs_at_once = (CHUNK_ROWS / (2 * longest)).max(1);
+        let weight = 1.0 / range.len() as f64;
+        for start in range.clone().step_by(pairs_at_once) {
+            let end = range.end.min(start + pairs_at_once);
+            let pairs: Vec<Labeled> = passes
+                .iter()
+                .flat_map(|p| p.order[start..end].iter().map(|&i| labeled[i]))
+                .collect();
+            let chunk = Chunk::gather(replay, pairs.iter().map(|l| &l.query), longest);
+            let input = self
+                .input(&chunk.rows)
+                .view([passes.len() as i64, -1, self.columns]);
+            let (output, tape) = self.net.forward_taped(&input);
+            let reward = output.tanh();
+            let logits = chunk.logits(&to_vec(&reward));
+            let n = end - start;
+            let mut slopes = Vec::with_capacity(pairs.len());
+            for (index, (labeled, logit)) in pairs.iter().zip(logits).enumerate() {
+                let pass = &mut passes[index / n];
+                let target = f64::from(labeled.preference.target());
+                let probability = 1.0 / (1.0 + (-logit).exp());
+                pass.loss += softplus(logit) - target * logit;
+                if labeled.preference != Preference::Equal {
+                    pass.n_judged += 1;
+                    pass.n_right += u32::from((logit > 0.0) == (target > 0.5));
+                }
+                slopes.push((probability - target) * weight);
+            }
+            let slopes = matrix(&chunk.row_slopes(&slopes), 1, self.options).view_as(&reward);
+            let gradient = slopes * (1.0 - reward.square());
+            self.net
+                .backward(&tape, gradient, Some(&mut self.gradient), None);
+        }
+    }
+
+    /// Mean over members of each step's reward, in (−1, 1), `[n]`, for rows `[n × S]`, `[n × A]`.
+    pub fn predict(&self, observations: &[f32], actions: &[f32]) -> Vec<f32> {
+        if actions.is_empty() {
+            return Vec::new();
+        }
+        let n_rows = observations.len() + actions.len();
+        let n_rows = (n_rows as i64 / self.columns) as usize;
+        let (s, a) = (observations.len() / n_rows, actions.len() / n_rows);
+        let rows = observations.chunks_exact(s).zip(actions.chunks_exact(a));
+        let rows: Vec<f32> = rows.flat_map(|(s, a)| s.iter().chain(a)).copied().collect();
+        let chunks = rows.chunks(CHUNK_ROWS * self.columns as usize);
+        chunks.flat_map(|rows| self.mean_rewards(rows)).collect()
+    }
+
+    /// Rewrites the learned reward of every transition.
+    pub fn relabel(&self, replay: &mut Replay) {
+        let mut rows = Vec::new();
+        for lane in 0..replay.n_lanes() {
+            let n_steps = replay.lane_len(lane);
+            for start in (0..n_steps).step_by(CHUNK_ROWS) {
+                let end = n_steps.min(start + CHUNK_ROWS);
+                rows.clear();
+                replay.append_lane_rows(lane, start..end, &mut rows);
+                replay.learned_rewards_mut(lane)[start..end]
+                    .copy_from_slice(&self.mean_rewards(&rows));
+            }
+        }
+    }
+
+    /// P(second ≻ first) of each member for each query, `[M][N]`.
+    pub fn probabilities(&self, replay: &Replay, queries: &[Query]) -> Vec<Vec<f32>> {
+        let mut probabilities = vec![Vec::with_capacity(queries.len()); self.config.members];
+        let longest = queries.iter().map(longest).max().unwrap_or(1);
+        for queries in queries.chunks((CHUNK_ROWS / (2 * longest)).max(1)) {
+            let chunk = Chunk::gather(replay, queries.iter(), longest);
+            let reward = to_vec(&self.net.forward(&self.input(&chunk.rows)).tanh());
+            let own = reward.len() / self.config.members;
+            for (member, reward) in probabilities.iter_mut().zip(reward.chunks(own)) {
+                member.extend(
+                    chunk
+                        .logits(reward)
+                        .into_iter().map(|logit| (1.0 / (1.0 + (-logit).exp())) as f32),
+                );
+            }
+        }
+        probabilities
+    }
+
+    /// Weights, moments and counters.
+    pub fn save(&self, archive: &mut Archive) {
+        self.parameters.save("reward", archive);
+        archive.put_json("reward.epochs", &self.n_epochs);
+    }
+
+    /// What [`RewardEnsemble::save`] wrote, from any device.
+    ///
+    /// # Errors
+    /// When a section is missing or of another network; part of it may then be loaded.
+    pub fn load(&mut self, archive: &Archive) -> Result<(), LearnError> {
+        self.parameters.load("reward", archive)?;
+        self.n_epochs = archive.json("reward.epochs")?;
+        Ok(())
+    }
+
+    fn mean_rewards(&self, rows: &[f32]) -> Vec<f32> {
+        let reward = self.net.forward(&self.input(rows)).tanh();
+        to_vec(&reward.mean_dim([0_i64].as_slice(), false, None))
+    }
+
+    fn input(&self, rows: &[f32]) -> Tensor {
+        matrix(rows, self.columns, self.options)
+    }
+}
+
+/// std over members (their number in the denominator) of P(second ≻ first), `[N]`.
+pub(crate) fn disagreement(probabilities: &[Vec<f32>]) -> Vec<f32> {
+    let n_members = probabilities.len() as f32;
+    let n_queries = probabilities.first().map_or(0, Vec::len);
+    let std = |query: usize| {
+        let of = |member: &Vec<f32>| member[query];
+        let mean = probabilities.iter().map(of).sum::<f32>() / n_members;
+        let squares = probabilities.iter().map(|m| (of(m) - mean).powi(2));
+        (squares.sum::<f32>() / n_members).sqrt()
+    };
+    (0..n_queries).map(std).collect()
+}
+
+/// Rows of several pairs, first then second segment, each padded to the longest.
+struct Chunk {
+    /// `[2 · pairs · longest × (S + A)]`.
+    rows: Vec<f32>,
+    /// Steps of each segment.
+    lens: Vec<usize>,
+    longest: usize,
+}
+
+impl Chunk {
+    fn gather<'a>(
+        replay: &Replay,
+        queries: impl Iterator<Item = &'a Query>,
+        longest: usize,
+    ) -> Self {
+        let shape = replay.shape();
+        let segment_len = longest * (shape.observation + shape.action);
+        let (mut rows, mut lens) = (Vec::new(), Vec::new());
+        for segment in queries.flat_map(|query| [query.first, query.second]) {
+            replay.append_segment_rows(segment, &mut rows);
+            lens.push(segment.len as usize);
+            rows.resize(lens.len() * segment_len, 0.0);
+        }
+        Self {
+            rows,
+            lens,
+            longest,
+        }
+    }
+
+    /// Σ r(second) − Σ r(first) of each pair, from one number a row.
+    fn logits(&self, rewards: &[f32]) -> Vec<f64> {
+        let sum =
+            |(reward, &len): (&[f32], &usize)| reward[..len].iter().copied().map(f64::from).sum();
+        let sums: Vec<f64> = rewards
+            .chunks(self.longest)
+            .zip(&self.lens)
+            .map(sum)
+            .collect();
+        sums.chunks_exact(2).map(|pair| pair[1] - pair[0]).collect()
+    }
+
+    /// What each row's reward adds to the loss, from what each pair's logit does.
+    fn row_slopes(&self, slopes: &[f64]) -> Vec<f32> {
+        let mut rows = vec![0.0; self.lens.len() * self.longest];
+        for (index, (rows, &len)) in rows.chunks_mut(self.longest).zip(&self.lens).enumerate() {
+            let sign = if index % 2 == 0 { -1.0 } else { 1.0 };
+            rows[..len].fill((sign * slopes[index / 2]) as f32);
+        }
+        rows
+    }
+}
+
+fn longest(query: &Query) -> usize {
+    let len = |segment: Segment| segment.len as usize;
+    len(query.first).max(len(query.second)).max(1)
+}
+
+/// ln(1 + eˣ) without overflow.
+fn softplus(x: f64) -> f64 {
+    x.max(0.0) + (-x.abs()).exp().ln_1p()
+}
+
+/// Key of the ensemble's initial weights.
+const FIRST_KEY: u64 = 1_000_000;
+
+#[cfg(test)]
+mod tests;

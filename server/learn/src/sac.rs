@@ -1,0 +1,417 @@
+//! Soft actor-critic with every gradient written out.
+
+use domain::random::{Rng, Stream};
+use serde::{Deserialize, Serialize};
+use tch::{Kind, Tensor};
+
+use crate::checkpoint::Archive;
+use crate::device::Device;
+use crate::error::LearnError;
+use crate::init;
+use crate::kernel;
+use crate::net::{Net, NetShape, Parameters, load_tensor, matrix, save_tensor, to_vec};
+use crate::replay::Batch;
+
+mod policy;
+
+use policy::Gaussian;
+
+/// Settings of the agent. Defaults: STAIR's released settings for MetaWorld (which are BPref's).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SacConfig {
+    /// Hidden layers of actor and critics.
+    pub hidden: Vec<i64>,
+    /// Transitions in an update, `B`.
+    pub batch: usize,
+    /// Adam's rate for the actor.
+    pub actor_learning_rate: f64,
+    /// Adam's rate for the critics.
+    pub critic_learning_rate: f64,
+    /// Adam's rate for log α.
+    pub alpha_learning_rate: f64,
+    /// γ.
+    pub discount: f64,
+    /// α at the start.
+    ///
+    /// Differs from the paper: its table says 0.2, the released code uses 0.1.
+    pub initial_temperature: f64,
+    /// τ: how far the target critics move towards the critics.
+    ///
+    /// Differs from the paper: its table says 0.01, the released code uses 0.005.
+    pub critic_ema: f64,
+    /// Updates between two movements of the target critics.
+    pub target_every: u64,
+    /// Whether the critics' hidden layers are normalised; the released code's are not. With it,
+    /// higher learning rates hold.
+    pub layer_norm: bool,
+}
+
+impl Default for SacConfig {
+    fn default() -> Self {
+        Self {
+            hidden: vec![256; 3],
+            batch: 512,
+            actor_learning_rate: 3e-4,
+            critic_learning_rate: 3e-4,
+            alpha_learning_rate: 1e-4,
+            discount: 0.99,
+            initial_temperature: 0.1,
+            critic_ema: 0.005,
+            target_every: 2,
+            layer_norm: false,
+        }
+    }
+}
+
+/// How the agent chooses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Act {
+    /// The policy's mean action: for evaluation.
+    Mean,
+    /// A sample, keyed by the environment step.
+    Sample {
+        /// Environment step.
+        step: u64,
+    },
+}
+
+/// What one update looked like.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SacMetrics {
+    /// Sum over both critics of the mean squared error.
+    pub critic_loss: f32,
+    /// mean(α log π − min Q).
+    pub actor_loss: f32,
+    /// Mean of both critics on the batch.
+    pub q_mean: f32,
+    /// Temperature before the update.
+    pub alpha: f32,
+    /// mean(−log π), nats.
+    pub entropy: f32,
+}
+
+/// The agent.
+pub struct Sac {
+    config: SacConfig,
+    seed: u64,
+    options: (Kind, tch::Device),
+    observation_size: i64,
+    action_size: i64,
+    actor: Trained,
+    critic: Trained,
+    target_values: Tensor,
+    target: Net,
+    temperature: Temperature,
+    n_updates: u64,
+    n_critic_resets: u64,
+}
+
+/// A net with its gradient.
+struct Trained {
+    parameters: Parameters,
+    net: Net,
+    gradient: Net,
+}
+
+impl Trained {
+    fn new(shape: &NetShape, learning_rate: f64, options: (Kind, tch::Device)) -> Self {
+        let parameters = Parameters::new(shape.n_values(), learning_rate, options);
+        let net = Net::over(shape, &parameters.values, 0);
+        let gradient = Net::over(shape, &parameters.gradient, 0);
+        Self {
+            parameters,
+            net,
+            gradient,
+        }
+    }
+}
+
+/// log α with its Adam, one number each.
+#[derive(Debug, Clone, Copy)]
+struct Temperature {
+    log_alpha: f64,
+    first: f64,
+    second: f64,
+    n_steps: u64,
+}
+
+impl Temperature {
+    fn alpha(&self) -> f64 {
+        self.log_alpha.exp()
+    }
+
+    fn step(&mut self, gradient: f64, learning_rate: f64) {
+        let (decay_1, decay_2, epsilon) = kernel::ADAM;
+        self.n_steps += 1;
+        let n = i32::try_from(self.n_steps).unwrap_or(i32::MAX);
+        self.first = decay_1 * self.first + (1.0 - decay_1) * gradient;
+        self.second = decay_2 * self.second + (1.0 - decay_2) * gradient * gradient;
+        let first = self.first / (1.0 - decay_1.powi(n));
+        let second = self.second / (1.0 - decay_2.powi(n));
+        self.log_alpha -= learning_rate * first / (second.sqrt() + epsilon);
+    }
+}
+
+/// A batch on the device.
+struct Rows {
+    observation: Tensor,
+    state_action: Tensor,
+    next_observation: Tensor,
+    reward: Tensor,
+    not_terminal: Tensor,
+}
+
+impl Sac {
+    /// Fresh weights that follow from `seed`.
+    pub fn new(
+        config: &SacConfig,
+        observation_size: usize,
+        action_size: usize,
+        seed: u64,
+        device: Device,
+    ) -> Self {
+        Self::with_kind(
+            config,
+            (observation_size, action_size),
+            seed,
+            (Kind::Float, device.0),
+        )
+    }
+
+    fn with_kind(
+        config: &SacConfig,
+        sizes: (usize, usize),
+        seed: u64,
+        options: (Kind, tch::Device),
+    ) -> Self {
+        crate::device::init();
+        let (s, a) = (sizes.0 as i64, sizes.1 as i64);
+        let actor_shape = NetShape::new(1, s, &config.hidden, 2 * a);
+        let critic_shape = NetShape {
+            layer_norm: config.layer_norm,
+            ..NetShape::new(2, s + a, &config.hidden, 1)
+        };
+        let critic = Trained::new(&critic_shape, config.critic_learning_rate, options);
+        let target_values = critic.parameters.values.zeros_like();
+        let mut sac = Self {
+            config: config.clone(),
+            seed,
+            options,
+            observation_size: s,
+            action_size: a,
+            actor: Trained::new(&actor_shape, config.actor_learning_rate, options),
+            critic,
+            target: Net::over(&critic_shape, &target_values, 0),
+            target_values,
+            temperature: Temperature {
+                log_alpha: config.initial_temperature.ln(),
+                first: 0.0,
+                second: 0.0,
+                n_steps: 0,
+            },
+            n_updates: 0,
+            n_critic_resets: 0,
+        };
+        init::orthogonal(
+            &mut sac.actor.net,
+            &mut Rng::new(seed, Stream::Weights, ACTOR),
+        );
+        sac.init_critic();
+        sac
+    }
+
+    fn init_critic(&mut self) {
+        let key = FIRST_CRITIC + self.n_critic_resets;
+        init::orthogonal(
+            &mut self.critic.net,
+            &mut Rng::new(self.seed, Stream::Weights, key),
+        );
+        self.target_values.copy_(&self.critic.parameters.values);
+    }
+
+    /// Actions in [−1, 1], `[n × A]`, for states `[n × S]`.
+    pub fn act(&self, observations: &[f32], how: Act) -> Vec<f32> {
+        let states = matrix(observations, self.observation_size, self.options);
+        let policy = Gaussian::new(&self.actor.net.forward(&states), self.action_size);
+        to_vec(&match how {
+            Act::Mean => policy.mean_action(),
+            Act::Sample { step } => {
+                let noise = self.noise(
+                    states.size()[0],
+                    &mut Rng::new(self.seed, Stream::Action, step),
+                );
+                policy.sample(&noise).action
+            }
+        })
+    }
+
+    /// One update of critics, actor, temperature and (every few) target, in this order.
+    ///
+    /// Source: BPref's `update`; targets y = r + γ (min Q̄(s′, a′) − α log π(a′|s′)) where
+    /// anything follows.
+    pub fn update(&mut self, batch: &Batch) -> SacMetrics {
+        let rows = self.rows(batch);
+        let mut rng = Rng::new(self.seed, Stream::Policy, self.n_updates);
+        let n = batch.len() as i64;
+        let (next_noise, noise) = (self.noise(n, &mut rng), self.noise(n, &mut rng));
+        let alpha = self.temperature.alpha();
+
+        let target = self.bellman_target(&rows, &next_noise, alpha);
+        let (critic_loss, q_mean) = self.critic_gradient(&rows, &target);
+        self.critic.parameters.step();
+        let (actor_loss, entropy) = self.actor_gradient(&rows, &noise, alpha);
+        self.actor.parameters.step();
+        let target_entropy = -(self.action_size as f64);
+        self.temperature.step(
+            alpha * (entropy - target_entropy),
+            self.config.alpha_learning_rate,
+        );
+        if self
+            .n_updates
+            .is_multiple_of(self.config.target_every.max(1))
+        {
+            kernel::lerp(
+                &mut self.target_values,
+                &self.critic.parameters.values,
+                self.config.critic_ema,
+            );
+        }
+        self.n_updates += 1;
+        SacMetrics {
+            critic_loss: critic_loss as f32,
+            actor_loss: actor_loss as f32,
+            q_mean: q_mean as f32,
+            alpha: alpha as f32,
+            entropy: entropy as f32,
+        }
+    }
+
+    /// Fresh critics, their target and their moments; actor and temperature stay.
+    pub fn reset_critic(&mut self) {
+        self.n_critic_resets += 1;
+        self.init_critic();
+        self.critic.parameters.reset_moments();
+    }
+
+    /// Updates so far.
+    pub fn n_updates(&self) -> u64 {
+        self.n_updates
+    }
+
+    /// Weights, moments, temperature and counters.
+    pub fn save(&self, archive: &mut Archive) {
+        self.actor.parameters.save("sac.actor", archive);
+        self.critic.parameters.save("sac.critic", archive);
+        save_tensor(&self.target_values, "sac.target", archive);
+        let t = &self.temperature;
+        archive.put_f64("sac.temperature", &[t.log_alpha, t.first, t.second]);
+        archive.put_json(
+            "sac.counters",
+            &(t.n_steps, self.n_updates, self.n_critic_resets),
+        );
+    }
+
+    /// What [`Sac::save`] wrote, from any device.
+    ///
+    /// # Errors
+    /// When a section is missing or of another network; part of the agent may then be loaded.
+    pub fn load(&mut self, archive: &Archive) -> Result<(), LearnError> {
+        self.actor.parameters.load("sac.actor", archive)?;
+        self.critic.parameters.load("sac.critic", archive)?;
+        load_tensor(&mut self.target_values, "sac.target", archive)?;
+        let [log_alpha, first, second] = archive.f64("sac.temperature")?;
+        let (n_steps, n_updates, n_critic_resets) = archive.json("sac.counters")?;
+        self.temperature = Temperature {
+            log_alpha,
+            first,
+            second,
+            n_steps,
+        };
+        (self.n_updates, self.n_critic_resets) = (n_updates, n_critic_resets);
+        Ok(())
+    }
+
+    fn rows(&self, batch: &Batch) -> Rows {
+        let (s, a) = (self.observation_size, self.action_size);
+        let observation = matrix(&batch.observation, s, self.options);
+        let action = matrix(&batch.action, a, self.options);
+        Rows {
+            state_action: Tensor::cat(&[&observation, &action], 1),
+            observation,
+            next_observation: matrix(&batch.next_observation, s, self.options),
+            reward: matrix(&batch.reward, 1, self.options),
+            not_terminal: matrix(&batch.not_terminal, 1, self.options),
+        }
+    }
+
+    fn noise(&self, n: i64, rng: &mut Rng) -> Tensor {
+        let mut noise = vec![0.0; (n * self.action_size) as usize];
+        rng.fill_normal(&mut noise);
+        matrix(&noise, self.action_size, self.options)
+    }
+
+    /// `[B × 1]`.
+    fn bellman_target(&self, rows: &Rows, noise: &Tensor, alpha: f64) -> Tensor {
+        let policy = Gaussian::new(
+            &self.actor.net.forward(&rows.next_observation),
+            self.action_size,
+        );
+        let sample = policy.sample(noise);
+        let state_action = Tensor::cat(&[&rows.next_observation, &sample.action], 1);
+        let (value, _) = self.target.forward(&state_action).min_dim(0, false);
+        let value = value - sample.log_probability * alpha;
+        &rows.reward + &rows.not_terminal * value * self.config.discount
+    }
+
+    /// Fills the critics' gradient; returns loss and mean Q.
+    fn critic_gradient(&mut self, rows: &Rows, target: &Tensor) -> (f64, f64) {
+        let (q, tape) = self.critic.net.forward_taped(&rows.state_action);
+        let error = &q - target;
+        let n = target.numel() as f64;
+        self.critic.parameters.zero_gradient();
+        self.critic.net.backward(
+            &tape,
+            &error * (2.0 / n),
+            Some(&mut self.critic.gradient),
+            None,
+        );
+        let loss = error.square().sum(None).double_value(&[]) / n;
+        (loss, q.mean(None).double_value(&[]))
+    }
+
+    /// Fills the actor's gradient; returns loss and entropy.
+    fn actor_gradient(&mut self, rows: &Rows, noise: &Tensor, alpha: f64) -> (f64, f64) {
+        let (s, a) = (self.observation_size, self.action_size);
+        let (output, tape) = self.actor.net.forward_taped(&rows.observation);
+        let policy = Gaussian::new(&output, a);
+        let sample = policy.sample(noise);
+        let state_action = Tensor::cat(&[&rows.observation, &sample.action], 1);
+        let (q, q_tape) = self.critic.net.forward_taped(&state_action);
+        let n = q.size()[1] as f64;
+        let (value, which) = q.min_dim(0, true);
+        let mut q_gradient = q.zeros_like();
+        let _ = q_gradient.scatter_value_(0, &which, -1.0 / n);
+        let action_gradient = self
+            .critic
+            .net
+            .backward(&q_tape, q_gradient, None, Some(s..s + a));
+        let action_gradient = action_gradient.expect("the action's columns were asked for");
+        let action_gradient = action_gradient.sum_dim_intlist([0_i64].as_slice(), false, None);
+        let gradient = policy.backward(&sample, noise, &action_gradient, alpha / n);
+        self.actor.parameters.zero_gradient();
+        self.actor
+            .net
+            .backward(&tape, gradient, Some(&mut self.actor.gradient), None);
+        let entropy = -sample.log_probability.mean(None).double_value(&[]);
+        let loss = -alpha * entropy - value.mean(None).double_value(&[]);
+        (loss, entropy)
+    }
+}
+
+/// Keys of initial weights: the actor, then the critics of each reset.
+const ACTOR: u64 = 0;
+const FIRST_CRITIC: u64 = 1_000;
+
+#[cfg(test)]
+mod tests;

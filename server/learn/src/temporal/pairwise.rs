@@ -1,0 +1,177 @@
+//! All distances between two sets of latent states, and the way back.
+//!
+//! The straightforward tensors of B × B × D numbers are what makes this step slow elsewhere
+//! (two of 22 MB at B = 416); here nothing larger than B × B is ever made.
+
+use tch::{Device, Kind, Tensor};
+
+use crate::kernel::{Real, values, values_mut};
+
+/// Under the root, so that it has a slope everywhere.
+const EPSILON: f64 = 1e-8;
+
+/// d(x, y) along the last dimension, broadcast over the others.
+pub(super) fn distance(x: &Tensor, y: &Tensor) -> Tensor {
+    let difference = x - y;
+    let half = difference.size().last().map_or(0, |d| d / 2);
+    let (ahead, _) = difference.narrow(-1, 0, half).max_dim(-1, false);
+    let apart = difference.narrow(-1, half, half).square().sum_dim_intlist(
+        [-1_i64].as_slice(),
+        false,
+        None,
+    );
+    ahead.relu() + (apart + EPSILON).sqrt()
+}
+
+/// Distances of B states `x` to B states `y`, with what the way back needs.
+pub(super) struct Pairwise {
+    x: Tensor,
+    y: Tensor,
+    half: i64,
+    /// The maximum, `[B × B]`.
+    ahead: Tensor,
+    /// Which coordinate was the maximum, −1 where none was positive; `[B × B]`, as numbers.
+    which: Tensor,
+    /// The root, `[B × B]`.
+    apart: Tensor,
+}
+
+impl Pairwise {
+    /// `x`, `y`: `[B × D]`.
+    pub(super) fn new(x: &Tensor, y: &Tensor) -> Self {
+        let (x, y) = (x.contiguous(), y.contiguous());
+        let (n, half) = (x.size()[0], x.size()[1] / 2);
+        let square = || Tensor::empty([n, n], (x.kind(), x.device()));
+        let (mut ahead, mut which, mut apart) = (square(), square(), square());
+        let outputs = (&mut ahead, &mut which, &mut apart);
+        match (x.device(), x.kind()) {
+            (Device::Cpu, Kind::Float) => forward::<f32>(&x, &y, outputs),
+            (Device::Cpu, Kind::Double) => forward::<f64>(&x, &y, outputs),
+            _ => forward_by_tensors(&x, &y, outputs),
+        }
+        Self {
+            x,
+            y,
+            half,
+            ahead,
+            which,
+            apart,
+        }
+    }
+
+    /// `[B × B]`.
+    pub(super) fn distance(&self) -> Tensor {
+        &self.ahead + &self.apart
+    }
+
+    /// Gradients of `x` and `y`, `[B × D]`, from that of the distances.
+    pub(super) fn backward(&self, slope: &Tensor) -> (Tensor, Tensor) {
+        let (x_ahead, y_ahead) = match (slope.device(), slope.kind()) {
+            (Device::Cpu, Kind::Float) => self.ahead_backward::<f32>(slope),
+            (Device::Cpu, Kind::Double) => self.ahead_backward::<f64>(slope),
+            _ => self.ahead_backward_by_tensors(slope),
+        };
+        let pull = slope / &self.apart;
+        let (x, y) = (
+            self.x.narrow(1, self.half, self.half),
+            self.y.narrow(1, self.half, self.half),
+        );
+        let sums = |dim: i64| {
+            pull.sum_dim_intlist([dim].as_slice(), false, None)
+                .unsqueeze(1)
+        };
+        let x_apart = &x * sums(1) - pull.matmul(&y);
+        let y_apart = &y * sums(0) - pull.transpose(0, 1).matmul(&x);
+        (
+            Tensor::cat(&[x_ahead, x_apart], 1),
+            Tensor::cat(&[y_ahead, y_apart], 1),
+        )
+    }
+
+    fn ahead_backward<T: Real>(&self, slope: &Tensor) -> (Tensor, Tensor) {
+        let (n, half) = (self.x.size()[0], self.half);
+        let zeros = || Tensor::zeros([n, half], (slope.kind(), slope.device()));
+        let (mut x_slope, mut y_slope) = (zeros(), zeros());
+        let slope = slope.contiguous();
+        let (n, half) = (n as usize, half as usize);
+        let y_slopes = values_mut::<T>(&mut y_slope);
+        let rows = values::<T>(&slope)
+            .chunks_exact(n)
+            .zip(values::<T>(&self.which).chunks_exact(n));
+        for ((slopes, which), x_slopes) in
+            rows.zip(values_mut::<T>(&mut x_slope).chunks_exact_mut(half))
+        {
+            for ((slope, which), y_slopes) in slopes
+                .iter()
+                .zip(which)
+                .zip(y_slopes.chunks_exact_mut(half))
+            {
+                if let Some(coordinate) = which.index() {
+                    x_slopes[coordinate] += *slope;
+                    y_slopes[coordinate] = y_slopes[coordinate] - *slope;
+                }
+            }
+        }
+        (x_slope, y_slope)
+    }
+
+    fn ahead_backward_by_tensors(&self, slope: &Tensor) -> (Tensor, Tensor) {
+        let along = |dim: i64| {
+            let own = |k: i64| {
+                (slope * self.which.eq(k as f64)).sum_dim_intlist([dim].as_slice(), false, None)
+            };
+            Tensor::stack(&(0..self.half).map(own).collect::<Vec<_>>(), 1)
+        };
+        (along(1), along(0).neg())
+    }
+}
+
+/// Fills the maximum, its coordinate and the root, row by row, all later states side by side.
+fn forward<T: Real>(x: &Tensor, y: &Tensor, outputs: (&mut Tensor, &mut Tensor, &mut Tensor)) {
+    let (n, half) = (x.size()[0] as usize, x.size()[1] as usize / 2);
+    let y = y.transpose(0, 1).contiguous();
+    let (y_ahead, y_apart) = values::<T>(&y).split_at(half * n);
+    let (ahead, which, apart) = outputs;
+    let rows = values_mut::<T>(ahead)
+        .chunks_exact_mut(n)
+        .zip(values_mut::<T>(which).chunks_exact_mut(n));
+    let rows = rows.zip(values_mut::<T>(apart).chunks_exact_mut(n));
+    for (x, ((ahead, which), apart)) in values::<T>(x).chunks_exact(2 * half).zip(rows) {
+        ahead.fill(T::of(0.0));
+        which.fill(T::of(-1.0));
+        apart.fill(T::of(EPSILON));
+        for (k, y) in y_ahead.chunks_exact(n).enumerate() {
+            let (x, k) = (x[k], T::of(k as f64));
+            for ((ahead, which), y) in ahead.iter_mut().zip(&mut *which).zip(y) {
+                let difference = x - *y;
+                let is_larger = difference > *ahead;
+                *ahead = if is_larger { difference } else { *ahead };
+                *which = if is_larger { k } else { *which };
+            }
+        }
+        for (x, y) in x[half..].iter().zip(y_apart.chunks_exact(n)) {
+            for (apart, y) in apart.iter_mut().zip(y) {
+                let difference = *x - *y;
+                *apart += difference * difference;
+            }
+        }
+        apart.iter_mut().for_each(|square| *square = square.sqrt());
+    }
+}
+
+fn forward_by_tensors(x: &Tensor, y: &Tensor, outputs: (&mut Tensor, &mut Tensor, &mut Tensor)) {
+    let half = x.size()[1] / 2;
+    let (ahead, which, apart) = outputs;
+    let _ = (ahead.zero_(), which.fill_(-1.0), apart.fill_(EPSILON));
+    let difference = |k: i64| x.narrow(1, k, 1) - y.narrow(1, k, 1).transpose(0, 1);
+    for k in 0..half {
+        let difference = difference(k);
+        let is_larger = difference.gt_tensor(ahead);
+        ahead.copy_(&difference.where_self(&is_larger, ahead));
+        let _ = which.masked_fill_(&is_larger, k);
+    }
+    for k in half..2 * half {
+        let _ = apart.g_add_(&difference(k).square());
+    }
+    let _ = apart.sqrt_();
+}
