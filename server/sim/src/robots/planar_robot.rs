@@ -15,7 +15,7 @@ use crate::world::World;
 /// Radius of the body, metres.
 pub const RADIUS: f32 = 0.16;
 /// From the robot's centre to the point between its jaws, metres.
-pub const REACH: f32 = 0.24;
+pub const REACH: f32 = 0.25;
 /// Fastest drive, metres per second.
 pub const TOP_SPEED: f32 = 0.6;
 
@@ -165,6 +165,9 @@ pub const N_BODIES: usize = 5;
 /// How high held things are lifted in pictures, metres.
 pub const LIFT: f32 = 0.09;
 
+/// Below the middle of the floor, where no camera sees it.
+const HIDDEN: Transform = Transform::at(0.0, 0.0, -0.15);
+
 const BLUE: Material = Material::plain(0.0, 0.45, 0.70);
 const SKY: Material = Material::plain(0.34, 0.71, 0.91);
 const WHITE: Material = Material::plain(0.97, 0.97, 0.97);
@@ -209,16 +212,16 @@ pub fn shapes(first_body: usize) -> Vec<Shape> {
 }
 
 /// Where the bodies of a robot at `robot` are: the robot, left and right jaw, and the same two
-/// in the colour of holding. The pair that does not apply is hidden below the floor.
+/// in the colour of holding. The pair that does not apply is hidden below the floor's middle.
 pub fn place(robot: Transform, openness: f32, is_holding: bool) -> [Transform; N_BODIES] {
-    let half_gap = 0.015 + 0.125 * openness;
+    let half_gap = 0.015 + 0.155 * openness;
     let jaw = |side: f32, is_shown: bool| {
-        let z = match (is_shown, is_holding) {
-            (false, _) => -1.0,
-            (true, false) => 0.0,
-            (true, true) => LIFT,
-        };
-        robot.then(Transform::at(0.0, side * half_gap, z))
+        let z = if is_holding { LIFT } else { 0.0 };
+        if is_shown {
+            robot.then(Transform::at(0.0, side * half_gap, z))
+        } else {
+            HIDDEN
+        }
     };
     [
         robot,

@@ -7,9 +7,9 @@
 //! A floor of [−1.2, 1.2]² inside low walls. The robot is a disc of radius 0.16 that drives in
 //! any direction at up to 0.6 m/s (lag 0.1 s) and turns its nose to where it is told to go; its
 //! body pushes what it touches. p is its centre, n its nose (a unit vector) and
-//! **j = p + 0.24 n** the point between its jaws. The object, a disc of radius 0.06, is at b; it
+//! **j = p + 0.25 n** the point between its jaws. The object, a disc of radius 0.075, is at b; it
 //! slides and comes to rest by itself. The goal, at g, is a mark on the floor of radius
-//! ρ = 0.12.
+//! ρ = 0.14.
 //!
 //! An episode has exactly **100** control steps of **0.05 s** (one world step with two substeps)
 //! and ends by the time limit only. Reset: p ~ U[−0.9, 0.9]², nose in any direction, then b and
@@ -55,7 +55,7 @@
 //! stage never pays, nor does dropping the object before the goal.
 //!
 //! # Success
-//! ‖g − b‖ ≤ ρ = 0.12: the object's centre over the mark, held or not.
+//! ‖g − b‖ ≤ ρ = 0.14: the object's centre over the mark, held or not.
 //!
 //! # Stages
 //! `return` while the object is held or at the goal; otherwise `fetch` while ‖b − j‖ ≤ 0.35, and
@@ -96,11 +96,11 @@ const POSE_SIZE: usize = 9;
 /// Half the floor's side.
 const FLOOR_HALF: f32 = 1.2;
 const WALL_HALF_THICKNESS: f32 = 0.05;
-const OBJECT_RADIUS: f32 = 0.06;
+const OBJECT_RADIUS: f32 = 0.075;
 const OBJECT_MASS: f32 = 0.2;
 /// Slows a pushed object by the floor's friction, 1/s.
 const OBJECT_DAMPING: f32 = 5.0;
-const GOAL_RADIUS: f32 = 0.12;
+const GOAL_RADIUS: f32 = 0.14;
 /// Between the jaws: this close to the point between them.
 const JAW_ZONE: f32 = 0.1;
 /// Openness of jaws that hold the object.

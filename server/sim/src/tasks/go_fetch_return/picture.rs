@@ -146,12 +146,12 @@ fn goal() -> [Shape; 2] {
             Material::marker(r, g, b, alpha),
         )
     };
-    [disc(0.004, 0.0, 0.3), disc(0.006, 0.09, 1.0)]
+    [disc(0.004, 0.0, 0.3), disc(0.006, 0.105, 1.0)]
 }
 
 /// The camera of the clips: raised, three quarters, the whole floor in a 4:3 picture.
 fn front() -> Camera {
-    looking("front", [0.0, -2.75, 2.6], [0.0, -0.12, 0.0], 42.0)
+    looking("front", [0.0, -3.8, 4.2], [0.0, -0.15, 0.0], 24.5)
 }
 
 /// Straight down, for maps of trajectories; x to the right, y up.
