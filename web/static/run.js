@@ -21,14 +21,13 @@ const PANELS = [
   { id: 'speed', format: compact, lines: [['steps a second', 'speed']] },
 ];
 
-let curves = emptyCurves();
+const curves = emptyCurves();
 let isDrawing = false;
 
-async function start() {
-  const recorded = await request('GET', `/api/v1/runs/${run}/metrics`).catch(() => []);
-  for (const event of recorded) addEvent(curves, event);
+function start() {
   draw();
   listen();
+  tellState();
   setInterval(tellState, 5_000);
 }
 
@@ -55,7 +54,10 @@ function drawSoon() {
   requestAnimationFrame(draw);
 }
 
-/** The server's events; the browser asks again by itself from the last one it has seen. */
+/**
+ * The server's events, from the first one of the run; after a lost connection the browser asks
+ * again by itself from the last one it has seen.
+ */
 function listen() {
   const source = new EventSource(`/api/v1/runs/${run}/events`);
   const take = (message) => {
@@ -69,10 +71,10 @@ function listen() {
     addEvent(curves, event);
     if (isHere) drawSoon();
     if (event.kind !== 'metrics') tellStateSoon();
-    if (['clip_stored', 'clip_ready', 'clips', 'answer_stored', 'answer', 'clip_failed'].includes(event.kind)) tellClipsSoon();
+    if (['clips', 'answer', 'clip_failed'].includes(event.kind)) tellClipsSoon();
   };
   source.onmessage = take;
-  for (const kind of ['phase', 'metrics', 'session_offered', 'session_closed', 'evaluation', 'finished', 'failed', 'answer', 'clips', 'state']) {
+  for (const kind of ['phase', 'metrics', 'session_offered', 'session_closed', 'evaluation', 'finished', 'failed', 'answer', 'clips', 'clip_failed', 'state']) {
     source.addEventListener(kind, take);
   }
   source.onopen = () => page.removeAttribute('data-offline');

@@ -1,0 +1,293 @@
+//! `/`: choose a task, or go on with a run.
+
+use std::time::Duration;
+
+use askama::Template;
+use axum::extract::{Form, State};
+use axum::response::{Redirect, Response};
+use lab::config::{Layers, RunConfig};
+use serde::Deserialize;
+use serde_json::{Map, json};
+
+use super::{show, thousands, title};
+use crate::api::runs::{self, RunRequest, RunView};
+use crate::assets;
+use crate::live::HUMAN;
+use crate::problem::Problem;
+use crate::state::AppState;
+
+/// Time that a person takes for one answer, looking once or twice.
+const ANSWER: Duration = Duration::from_secs(4);
+
+#[derive(Template)]
+#[template(path = "home.html")]
+struct HomePage {
+    /// In the order of the registry.
+    tasks: Vec<TaskCard>,
+    /// The same options for every task.
+    methods: Vec<Choice>,
+    teachers: Vec<Choice>,
+    presets: Vec<Choice>,
+    /// Newest first.
+    runs: Vec<RunLine>,
+    has_runs: bool,
+}
+
+/// What a person wants to know before pressing Start.
+struct TaskCard {
+    /// As programs type it.
+    name: &'static str,
+    /// As people read it.
+    title: &'static str,
+    /// What the agent should learn, one sentence.
+    summary: &'static str,
+    /// Address of a picture.
+    picture: String,
+    /// `about 80 answers`
+    labels: String,
+    /// `about 10 minutes`
+    minutes: String,
+    /// Answers at most, unless chosen otherwise.
+    budget: u32,
+}
+
+/// One line of a drop-down list.
+struct Choice {
+    /// For the server.
+    value: &'static str,
+    /// For people.
+    words: String,
+    /// Chosen unless somebody opens the list.
+    is_default: bool,
+}
+
+/// A run that exists.
+struct RunLine {
+    id: String,
+    /// The task's title.
+    title: String,
+    /// The method, as people read it.
+    method: String,
+    /// Kind of state, for colour.
+    state: String,
+    /// State in a few words.
+    message: String,
+    /// `20 of 80 answers`
+    labels: String,
+    /// Whether people can answer it now.
+    can_label: bool,
+}
+
+/// `GET /`
+///
+/// # Errors
+/// A store that cannot be read.
+pub async fn page(State(app): State<AppState>) -> Result<Response, Problem> {
+    let runs = run_lines(&app).await?;
+    Ok(show(&HomePage {
+        tasks: sim::tasks::tasks().iter().map(card).collect(),
+        methods: methods(),
+        teachers: teachers(),
+        presets: presets(),
+        has_runs: !runs.is_empty(),
+        runs,
+    }))
+}
+
+/// What the form of a task sends; everything but the task may be left alone.
+#[derive(Deserialize)]
+pub struct StartForm {
+    task: String,
+    method: Option<String>,
+    preset: Option<String>,
+    teacher: Option<String>,
+    /// A number, or empty.
+    budget: Option<String>,
+    /// A number, or empty.
+    seed: Option<String>,
+}
+
+/// `POST /runs`: starts a run and goes where it is answered, or watched where a script answers.
+///
+/// # Errors
+/// Settings that do not fit, with the nearest right name.
+pub async fn start(
+    State(app): State<AppState>,
+    Form(form): Form<StartForm>,
+) -> Result<Redirect, Problem> {
+    let is_for_people = form
+        .teacher
+        .as_deref()
+        .is_none_or(|teacher| teacher == HUMAN);
+    let mut settings = Map::new();
+    if let Some(budget) = number("Answers at most", form.budget.as_deref())? {
+        settings.insert("feedback.budget".to_owned(), json!(budget));
+    }
+    let request = RunRequest {
+        task: form.task,
+        method: form.method,
+        preset: form.preset,
+        seed: number("Seed", form.seed.as_deref())?,
+        teacher: form.teacher,
+        settings,
+        ..RunRequest::default()
+    };
+    let run = runs::start(&app, request).await?;
+    let next = if is_for_people { "/label" } else { "" };
+    Ok(Redirect::to(&format!("/runs/{run}{next}")))
+}
+
+/// A field of a form that may be left empty.
+fn number(field: &str, text: Option<&str>) -> Result<Option<u64>, Problem> {
+    match text.map(str::trim) {
+        None | Some("") => Ok(None),
+        Some(text) => text.parse().map(Some).map_err(|_| {
+            Problem::unusable_settings(format!("{field} must be a whole number, not '{text}'."))
+        }),
+    }
+}
+
+async fn run_lines(app: &AppState) -> Result<Vec<RunLine>, Problem> {
+    let mut lines = Vec::new();
+    for row in app.store.runs().await? {
+        lines.push(run_line(runs::view(app, row).await?));
+    }
+    Ok(lines)
+}
+
+fn run_line(run: RunView) -> RunLine {
+    let is_up = matches!(run.state.kind.as_str(), "training" | "waiting_for_labels");
+    RunLine {
+        id: run.id.to_string(),
+        title: title(&run.task).to_owned(),
+        method: method_name(&run.method),
+        can_label: run.teacher == HUMAN && is_up,
+        state: run.state.kind,
+        message: run.state.message,
+        labels: format!(
+            "{} of {} answers",
+            thousands(run.labels.into()),
+            thousands(run.budget.into())
+        ),
+    }
+}
+
+fn card(task: &'static sim::tasks::Task) -> TaskCard {
+    let layers = Layers {
+        task: Some(task.name.to_owned()),
+        method: Some("stair".to_owned()),
+        presets: vec!["quick".to_owned()],
+        ..Layers::default()
+    };
+    let config = RunConfig::resolve(&layers).unwrap_or_default();
+    let budget = config.feedback.budget;
+    TaskCard {
+        name: task.name,
+        title: task.title,
+        summary: task.summary,
+        picture: picture(task.name),
+        labels: format!("about {} answers", thousands(budget.into())),
+        minutes: words_for(practice(task.name, config.training.total_steps) + ANSWER * budget),
+        budget,
+    }
+}
+
+/// A drawn picture where there is one, a sketch otherwise.
+fn picture(task: &str) -> String {
+    let names = ["png", "svg"].map(|kind| format!("cards/{task}.{kind}"));
+    let found = names.into_iter().find(|name| assets::contains(name));
+    format!("/static/{}", found.as_deref().unwrap_or("cards/any.svg"))
+}
+
+/// Time that the agent itself takes on two cores: steps over the measured speed of the quick
+/// presets (400 and 125 steps a second).
+fn practice(task: &str, total_steps: u64) -> Duration {
+    let steps_per_s = if task == "go-fetch-return" { 400 } else { 125 };
+    Duration::from_secs(total_steps / steps_per_s)
+}
+
+/// `about 10 minutes`, `about 2 hours`.
+fn words_for(time: Duration) -> String {
+    let minutes = time.as_secs().div_ceil(60);
+    match minutes {
+        0..=12 => format!("about {} minutes", minutes.max(2)),
+        13..=50 => format!("about {} minutes", minutes.div_ceil(5) * 5),
+        51..=89 => "about an hour".to_owned(),
+        _ => format!("about {} hours", (minutes + 30) / 60),
+    }
+}
+
+fn methods() -> Vec<Choice> {
+    let choice = |method: &lab::method::MethodEntry| Choice {
+        value: method.name,
+        words: format!("{}: {}", method_name(method.name), method.summary),
+        is_default: method.name == "stair",
+    };
+    lab::method::METHODS.iter().map(choice).collect()
+}
+
+/// `stair` → `STAIR`; methods are acronyms, all but one.
+pub fn method_name(name: &str) -> String {
+    if name == "uniform" {
+        "Uniform".to_owned()
+    } else {
+        name.to_uppercase()
+    }
+}
+
+fn teachers() -> Vec<Choice> {
+    let all = [
+        (HUMAN, "People, on these pages"),
+        ("oracle", "A script that never errs"),
+        ("mistaken", "A script that errs now and then"),
+    ];
+    choices(&all)
+}
+
+fn presets() -> Vec<Choice> {
+    choices(&[
+        ("quick", "Quick: for two cores and people"),
+        ("", "As in the paper"),
+    ])
+}
+
+/// The first is the default.
+fn choices(all: &[(&'static str, &str)]) -> Vec<Choice> {
+    let choice = |(i, (value, words)): (usize, &(&'static str, &str))| Choice {
+        value,
+        words: (*words).to_owned(),
+        is_default: i == 0,
+    };
+    all.iter().enumerate().map(choice).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_are_told_as_people_tell_them() {
+        let words = [30, 550, 1_500, 4_000, 9_000].map(|s| words_for(Duration::from_secs(s)));
+        assert_eq!(
+            words,
+            [
+                "about 2 minutes",
+                "about 10 minutes",
+                "about 25 minutes",
+                "about an hour",
+                "about 3 hours"
+            ]
+        );
+    }
+
+    #[test]
+    fn every_task_has_a_picture() {
+        for task in sim::tasks::tasks() {
+            assert!(
+                picture(task.name).contains(task.name),
+                "{}",
+                picture(task.name)
+            );
+        }
+    }
+}

@@ -1,0 +1,99 @@
+//! `/runs/{id}/label`: two clips, one question, single keys.
+
+use askama::Template;
+use axum::extract::{Form, State};
+use axum::http::{HeaderMap, header};
+use axum::response::{IntoResponse as _, Redirect, Response};
+use serde::Deserialize;
+use store::RunRow;
+
+use super::guidance::guidance;
+use super::{show, thousands, title};
+use crate::api::labelers;
+use crate::extract::{Run, labeler};
+use crate::problem::Problem;
+use crate::state::AppState;
+
+#[derive(Template)]
+#[template(path = "label.html")]
+struct LabelPage {
+    /// The run's number.
+    run: String,
+    /// The task as people read it.
+    task_title: &'static str,
+    /// What the agent should learn, one sentence.
+    aim: &'static str,
+    /// HTML.
+    guidance: String,
+    /// Sent along with every answer.
+    guidance_sha256: String,
+    /// `20 of 80 answers`
+    answers: String,
+    /// Answers used.
+    labels: u32,
+    /// Answers at most.
+    budget: u32,
+}
+
+#[derive(Template)]
+#[template(path = "name.html")]
+struct NamePage {
+    /// The run's number.
+    run: String,
+}
+
+/// What the form for the name sends.
+#[derive(Deserialize)]
+pub struct NameForm {
+    name: String,
+}
+
+/// `GET /runs/{id}/label`; asks for a name first where this browser has none.
+///
+/// # Errors
+/// A run that does not exist; a store that cannot be read.
+pub async fn page(
+    State(app): State<AppState>,
+    Run(run): Run,
+    headers: HeaderMap,
+) -> Result<Response, Problem> {
+    if labeler(&app, &headers).await?.is_none() {
+        return Ok(show(&NamePage {
+            run: run.id.to_string(),
+        }));
+    }
+    Ok(show(&filled_in(&run)))
+}
+
+/// `POST /runs/{id}/label`: the name, kept in a cookie for a year.
+///
+/// # Errors
+/// A name of no or more than 80 letters; a run that does not exist.
+pub async fn sign_in(
+    State(app): State<AppState>,
+    Run(run): Run,
+    Form(form): Form<NameForm>,
+) -> Result<Response, Problem> {
+    let (cookie, _) = labelers::sign_in(&app, &form.name).await?;
+    let to = Redirect::to(&format!("/runs/{}/label", run.id));
+    Ok(([(header::SET_COOKIE, cookie)], to).into_response())
+}
+
+fn filled_in(run: &RunRow) -> LabelPage {
+    let task = sim::tasks::task(&run.task).ok();
+    let guidance = guidance(&run.task);
+    LabelPage {
+        run: run.id.to_string(),
+        task_title: title(&run.task),
+        aim: task.map_or("", |task| task.summary),
+        guidance: guidance.html,
+        guidance_sha256: guidance.sha256,
+        answers: format!(
+            "{} of {} answers",
+            thousands(run.n_labels.into()),
+            thousands(run.budget.into())
+        ),
+        labels: run.n_labels,
+        budget: run.budget,
+    }
+}

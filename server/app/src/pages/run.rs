@@ -1,0 +1,317 @@
+//! `/runs/{id}`: how one run does, and the buttons that steer it.
+
+use askama::Template;
+use axum::extract::State;
+use axum::response::{Redirect, Response};
+use store::{AnsweredPair, DemonstrationRow, RunId};
+
+use super::home::method_name;
+use super::{percent, show, thousands, time_of_day, title};
+use crate::api::clips::address;
+use crate::api::runs::{self, RunView};
+use crate::extract::Run;
+use crate::live::HUMAN;
+use crate::problem::Problem;
+use crate::state::AppState;
+
+/// Answered pairs on the page.
+const N_PAIRS: u32 = 6;
+
+#[derive(Template)]
+#[template(path = "run.html")]
+struct RunPage {
+    /// The run's number.
+    run: String,
+    /// The task as people read it.
+    task_title: &'static str,
+    /// `STAIR, quick, seed 1, people answer`
+    method_words: String,
+    /// Whether people answer, rather than a program or a script.
+    is_for_people: bool,
+    /// Kind of state, for colour and for which buttons there are.
+    state: String,
+    /// What it is doing.
+    message: String,
+    /// `since 14:02:11`
+    since: String,
+    /// What comes next.
+    next: String,
+    /// Environment steps, now and in all.
+    step: u64,
+    total_steps: u64,
+    steps_done: String,
+    /// Answers, used and at most.
+    labels: u32,
+    budget: u32,
+    labels_used: String,
+    /// Of the last trial: `35 %`.
+    success: String,
+    /// `7 of 9`, of the stage questions that were answered.
+    same_stage: String,
+    /// What the researcher should know about, in words.
+    broken: Vec<String>,
+    has_broken: bool,
+    n_broken: usize,
+    /// The first and the newest episode of the policy.
+    first: Shown,
+    latest: Shown,
+    has_demonstration: bool,
+    /// Changes when the two do.
+    demonstrations_version: String,
+    curves: &'static [Curve],
+    pairs: Vec<Pair>,
+    has_pairs: bool,
+    /// Changes when the newest pairs do.
+    pairs_version: String,
+}
+
+/// A clip with its words.
+#[derive(Default)]
+struct Shown {
+    /// Address.
+    clip: String,
+    caption: String,
+}
+
+/// A panel that `run.js` draws into.
+struct Curve {
+    /// Name in `run.js`.
+    id: &'static str,
+    title: &'static str,
+    /// What it shows and how to read it.
+    says: &'static str,
+    /// Instead of an empty panel.
+    before: &'static str,
+}
+
+/// An answered pair.
+struct Pair {
+    /// Addresses of the clips as they were shown.
+    left: String,
+    right: String,
+    is_left: bool,
+    is_right: bool,
+    /// What was answered, in words.
+    answer: &'static str,
+    /// `round 2, 14:02:11`
+    who: String,
+}
+
+const CURVES: &[Curve] = &[
+    Curve {
+        id: "success",
+        title: "Success",
+        says: "Share of held-out episodes that reach the goal.",
+        before: "After the first trial.",
+    },
+    Curve {
+        id: "return",
+        title: "Task reward",
+        says: "Sum over an episode. Solid: trials. Dashed: while training.",
+        before: "After the first episodes.",
+    },
+    Curve {
+        id: "accuracy",
+        title: "Reward model",
+        says: "How often it agrees with the answers.",
+        before: "After the first round of answers.",
+    },
+    Curve {
+        id: "correlation",
+        title: "Learned and task reward",
+        says: "Correlation over the steps of held-out episodes.",
+        before: "After the first round of answers.",
+    },
+    Curve {
+        id: "gap",
+        title: "Stage gap",
+        says: "Smaller is better aligned, nats. Solid: pairs asked. Dashed: all candidates.",
+        before: "Where pairs are chosen by stage, from the second round.",
+    },
+    Curve {
+        id: "disagreement",
+        title: "Disagreement",
+        says: "Of the reward models. Solid: pairs asked. Dashed: all candidates.",
+        before: "From the second round.",
+    },
+    Curve {
+        id: "labels",
+        title: "Answers",
+        says: "That the reward is learned from.",
+        before: "After the first round of answers.",
+    },
+    Curve {
+        id: "speed",
+        title: "Speed",
+        says: "Steps of practice a second.",
+        before: "In a moment.",
+    },
+];
+
+/// `GET /runs/{id}`
+///
+/// # Errors
+/// A run that does not exist; a store that cannot be read.
+pub async fn page(State(app): State<AppState>, Run(row): Run) -> Result<Response, Problem> {
+    let id = row.id;
+    let run = runs::view(&app, row).await?;
+    let demonstrations = app.store.demonstrations(id).await?;
+    let pairs = app.store.newest_pairs(id, N_PAIRS).await?;
+    let (n_same, n_judged) = app.store.same_stage_rate(id).await?;
+    let success = last_success(&app, id).await?;
+    let broken = broken(&app, id).await?;
+    Ok(show(&RunPage {
+        run: id.to_string(),
+        task_title: title(&run.task),
+        method_words: method_words(&run),
+        is_for_people: run.teacher == HUMAN,
+        since: format!("since {}", time_of_day(&run.state.since)),
+        step: run.step,
+        total_steps: run.total_steps,
+        steps_done: thousands(run.step),
+        labels: run.labels,
+        budget: run.budget,
+        labels_used: format!(
+            "{} of {}",
+            thousands(run.labels.into()),
+            thousands(run.budget.into())
+        ),
+        success: success.map_or_else(none_yet, percent),
+        same_stage: if n_judged == 0 {
+            none_yet()
+        } else {
+            format!("{n_same} of {n_judged}")
+        },
+        has_broken: !broken.is_empty(),
+        n_broken: broken.len(),
+        broken,
+        has_demonstration: !demonstrations.is_empty(),
+        demonstrations_version: demonstrations.len().to_string(),
+        first: demonstrations
+            .first()
+            .map_or_else(Shown::default, |row| shown("At first", row)),
+        latest: demonstrations
+            .last()
+            .map_or_else(Shown::default, |row| shown("Now", row)),
+        curves: CURVES,
+        has_pairs: !pairs.is_empty(),
+        pairs_version: pairs_version(&pairs),
+        pairs: pairs.iter().map(pair).collect(),
+        state: run.state.kind,
+        message: run.state.message,
+        next: run.state.next,
+    }))
+}
+
+/// `POST /runs/{id}/pause`
+///
+/// # Errors
+/// A run that is not up.
+pub async fn pause(State(app): State<AppState>, Run(run): Run) -> Result<Redirect, Problem> {
+    app.live.pause(run.id)?;
+    Ok(back(run.id))
+}
+
+/// `POST /runs/{id}/resume`
+///
+/// # Errors
+/// A run that is finished.
+pub async fn resume(State(app): State<AppState>, Run(run): Run) -> Result<Redirect, Problem> {
+    runs::check_resumable(&run)?;
+    app.live.resume(run.id)?;
+    Ok(back(run.id))
+}
+
+/// `POST /runs/{id}/stop`
+///
+/// # Errors
+/// A run that is not up.
+pub async fn stop(State(app): State<AppState>, Run(run): Run) -> Result<Redirect, Problem> {
+    app.live.stop(run.id)?;
+    Ok(back(run.id))
+}
+
+fn back(run: RunId) -> Redirect {
+    Redirect::to(&format!("/runs/{run}"))
+}
+
+fn none_yet() -> String {
+    "–".to_owned()
+}
+
+fn method_words(run: &RunView) -> String {
+    let teacher = match run.teacher.as_str() {
+        HUMAN => "people answer".to_owned(),
+        "http" => "a program answers".to_owned(),
+        script => format!("the script '{script}' answers"),
+    };
+    let preset = if run.preset.is_empty() {
+        "full size"
+    } else {
+        run.preset.as_str()
+    };
+    format!(
+        "{}, {preset}, seed {}, {teacher}",
+        method_name(&run.method),
+        run.seed
+    )
+}
+
+/// Success rate of the last trial, where there was one.
+async fn last_success(app: &AppState, run: RunId) -> Result<Option<f64>, Problem> {
+    let events = app.store.events_of(run, &["evaluation"]).await?;
+    let last = events
+        .last()
+        .and_then(|event| serde_json::from_str::<serde_json::Value>(&event.data).ok());
+    Ok(last.and_then(|event| event["success_rate"].as_f64()))
+}
+
+async fn broken(app: &AppState, run: RunId) -> Result<Vec<String>, Problem> {
+    let bad = app.store.bad_queries(run).await?;
+    let lines = bad.iter().map(|query| {
+        format!(
+            "A pair of round {} cannot be shown: {}. Another one is asked instead.",
+            query.session + 1,
+            query.trouble
+        )
+    });
+    let trouble = app.live.clip_trouble().map(str::to_owned);
+    Ok(trouble.into_iter().chain(lines).collect())
+}
+
+fn shown(when: &str, row: &DemonstrationRow) -> Shown {
+    let outcome = if row.shows.success {
+        "success"
+    } else {
+        "no success"
+    };
+    Shown {
+        clip: address(&row.clip),
+        caption: format!(
+            "{when}, after {} steps: {outcome}",
+            thousands(row.shows.step)
+        ),
+    }
+}
+
+fn pair(row: &AnsweredPair) -> Pair {
+    Pair {
+        left: address(&row.left),
+        right: address(&row.right),
+        is_left: row.answer == "left",
+        is_right: row.answer == "right",
+        answer: match row.answer.as_str() {
+            "left" => "left is better",
+            "right" => "right is better",
+            "equal" => "about the same",
+            _ => "passed over",
+        },
+        who: format!("round {}, {}", row.session + 1, time_of_day(&row.stored_at)),
+    }
+}
+
+fn pairs_version(pairs: &[AnsweredPair]) -> String {
+    pairs.first().map_or_else(String::new, |newest| {
+        format!("{} {}", newest.query_id, newest.stored_at)
+    })
+}
