@@ -68,8 +68,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         Form::Clip => clip::encode(&images, clip::frames_per_second(images.len()))?.bytes,
         Form::Sheet => png(&contact_sheet(&images)?)?,
     };
-    std::fs::write(&args.out, &bytes)
-        .with_context(|| format!("writing {}", args.out.display()))?;
+    std::fs::write(&args.out, &bytes).with_context(|| format!("writing {}", args.out.display()))?;
     println!(
         "{}: {} frames of {}, {} kB",
         args.out.display(),
@@ -97,19 +96,23 @@ fn camera<'a>(scene: &'a Scene, name: Option<&str>) -> anyhow::Result<&'a Camera
     let Some(name) = name else {
         return scene.cameras.first().context("the task has no camera");
     };
-    scene.cameras.iter().find(|c| c.name == name).ok_or_else(|| {
-        let known: Vec<&str> = scene.cameras.iter().map(|c| c.name.as_str()).collect();
-        BadInput(format!(
-            "there is no camera '{name}' here; the cameras are: {}",
-            known.join(", ")
-        ))
-        .into()
-    })
+    scene
+        .cameras
+        .iter()
+        .find(|c| c.name == name)
+        .ok_or_else(|| {
+            let known: Vec<&str> = scene.cameras.iter().map(|c| c.name.as_str()).collect();
+            BadInput(format!(
+                "there is no camera '{name}' here; the cameras are: {}",
+                known.join(", ")
+            ))
+            .into()
+        })
 }
 
 /// The frames after each step of one episode.
 fn episode(
-    task: &sim::Task,
+    task: &sim::tasks::Task,
     policy: &Policy,
     seed: u64,
     n_steps: Option<u32>,
@@ -149,13 +152,15 @@ mod tests {
 
     #[test]
     fn a_file_of_another_kind_is_refused_before_anything_is_drawn() {
-        let error = form(Path::new("clip.gif"), false).err().map(|e| e.to_string());
+        let error = form(Path::new("clip.gif"), false)
+            .err()
+            .map(|e| e.to_string());
         assert!(error.is_some_and(|e| e.contains(".mp4") && e.contains(".png")));
     }
 
     #[test]
     fn an_unknown_camera_is_answered_with_the_known_ones() {
-        let scene = (sim::tasks()[0].scene)();
+        let scene = (sim::tasks::tasks()[0].scene)();
         let error = camera(&scene, Some("nowhere")).err().map(|e| e.to_string());
         assert!(error.is_some_and(|e| e.contains(&scene.cameras[0].name)));
     }
