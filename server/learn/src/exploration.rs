@@ -243,3 +243,104 @@ impl RunningStd {
         self.count = total;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use domain::environment::{EpisodeEnd, TaskReward};
+    use domain::random::{Rng, Stream};
+
+    use super::*;
+    use crate::replay::{NewStep, ReplayShape};
+
+    fn replay(n_steps: usize) -> Replay {
+        let shape = ReplayShape {
+            observation: 7,
+            action: 1,
+            pose: 0,
+        };
+        let mut replay = Replay::new(shape, 1);
+        let mut rng = Rng::new(1, Stream::Test, 0);
+        let mut state = || {
+            let mut values = vec![0.0; 7];
+            rng.fill_normal(&mut values);
+            values
+        };
+        for _ in 0..n_steps / 100 {
+            replay.begin_episode(0, 0, &state(), &[], None);
+            for t in 0..100 {
+                let next = state();
+                let step = NewStep {
+                    action: &[0.0],
+                    learned_reward: 0.0,
+                    task_reward: TaskReward(0.0),
+                    success: false,
+                    stage: None,
+                    end: (t == 99).then_some(EpisodeEnd::TimeLimit),
+                    next_observation: &next,
+                    next_pose: &[],
+                };
+                replay.push(0, step);
+            }
+        }
+        replay
+    }
+
+    #[test]
+    fn the_distance_is_to_the_fifth_neighbour_beside_itself() {
+        let replay = replay(1_300);
+        let batch = replay.sample(20, &mut Rng::new(2, Stream::Test, 0));
+        let found = neighbour_distances(&batch.observation, 7, replay.visited_states(), 5);
+        let states: Vec<f32> = replay.visited_states().flatten().copied().collect();
+        for (query, found) in batch.observation.chunks(7).zip(found) {
+            let squares = states.chunks(7).map(|s| {
+                s.iter()
+                    .zip(query)
+                    .map(|(a, b)| (a - b).powi(2))
+                    .sum::<f32>()
+            });
+            let mut distances: Vec<f32> = squares.map(f32::sqrt).collect();
+            distances.sort_by(f32::total_cmp);
+            assert!(
+                (distances[5] - found).abs() < 1e-5,
+                "{} {found}",
+                distances[5]
+            );
+        }
+    }
+
+    #[test]
+    fn the_running_std_follows_the_data_and_the_slip_inflates_it() {
+        let std_after = |n: u64, has_slip| {
+            let mut running = RunningStd::new();
+            for step in 0..n {
+                let mut values = vec![0.0; 512];
+                Rng::new(1, Stream::Test, step).fill_normal(&mut values);
+                values.iter_mut().for_each(|v| *v *= 0.1);
+                running.update(&values, has_slip);
+            }
+            running.variance.sqrt()
+        };
+        assert!((std_after(101, false) - 0.1).abs() < 0.002);
+        // emulated with the released code: 0.504 after 2, 0.141 after 101 updates
+        assert!((std_after(2, true) - 0.504).abs() < 0.01);
+        assert!((std_after(101, true) - 0.141).abs() < 0.005);
+    }
+
+    #[test]
+    fn an_interrupted_explorer_goes_on_bit_for_bit() {
+        let replay = replay(300);
+        let batch = replay
+            .sample(20, &mut Rng::new(2, Stream::Test, 0))
+            .observation;
+        let config = ExplorationConfig::default();
+        let (mut whole, mut resumed) = (StateEntropy::new(&config), StateEntropy::new(&config));
+        whole.intrinsic(&batch, &replay);
+        let mut archive = Archive::new();
+        whole.save(&mut archive);
+        resumed.load(&archive).expect("loads");
+        assert_eq!(
+            whole.intrinsic(&batch, &replay),
+            resumed.intrinsic(&batch, &replay)
+        );
+    }
+}

@@ -408,3 +408,6 @@ fn check<T: Real>(tensor: &Tensor) {
         "kernels take contiguous tensors of the processor"
     );
 }
+
+#[cfg(test)]
+mod tests;

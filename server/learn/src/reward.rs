@@ -281,7 +281,8 @@ impl RewardEnsemble {
                 member.extend(
                     chunk
                         .logits(reward)
-                        .into_iter().map(|logit| (1.0 / (1.0 + (-logit).exp())) as f32),
+                        .into_iter()
+                        .map(|logit| (1.0 / (1.0 + (-logit).exp())) as f32),
                 );
             }
         }

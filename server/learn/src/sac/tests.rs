@@ -1,1 +1,220 @@
+use super::*;
 
+const SIZES: (usize, usize) = (5, 3);
+const DOUBLE: (Kind, tch::Device) = (Kind::Double, tch::Device::Cpu);
+
+fn small(layer_norm: bool) -> SacConfig {
+    SacConfig {
+        hidden: vec![16, 12],
+        batch: 20,
+        layer_norm,
+        ..SacConfig::default()
+    }
+}
+
+fn batch(n: usize, step: u64) -> Batch {
+    let mut rng = Rng::new(4, Stream::Test, step);
+    let mut normals = |n: usize| {
+        let mut values = vec![0.0; n];
+        rng.fill_normal(&mut values);
+        values
+    };
+    Batch {
+        observation: normals(n * SIZES.0),
+        action: normals(n * SIZES.1).iter().map(|x| x.tanh()).collect(),
+        reward: normals(n),
+        next_observation: normals(n * SIZES.0),
+        not_terminal: (0..n).map(|i| f32::from(u8::from(i % 5 != 0))).collect(),
+    }
+}
+
+/// The same stack as the library's own operations, whose derivative autograd finds.
+fn reference_forward(shape: &NetShape, flat: &Tensor, input: &Tensor) -> Tensor {
+    let mut offset = 0;
+    let mut take = |size: [i64; 3]| {
+        let len = size.iter().product();
+        offset += len;
+        flat.narrow(0, offset - len, len).view(size)
+    };
+    let mut x = input.shallow_clone();
+    let last = shape.sizes.len() - 2;
+    for (i, pair) in shape.sizes.windows(2).enumerate() {
+        let weight = take([shape.n_members, pair[0], pair[1]]);
+        x = x.matmul(&weight) + take([shape.n_members, 1, pair[1]]);
+        if i < last && shape.layer_norm {
+            let (gain, shift) = (
+                take([shape.n_members, 1, pair[1]]),
+                take([shape.n_members, 1, pair[1]]),
+            );
+            x = x.layer_norm([pair[1]], None::<Tensor>, None::<Tensor>, 1e-5, false) * gain + shift;
+        }
+        if i < last {
+            x = x.relu();
+        }
+    }
+    x
+}
+
+fn reference_policy(output: &Tensor, noise: &Tensor) -> (Tensor, Tensor) {
+    let output = output.squeeze_dim(0);
+    let (mean, raw) = (output.narrow(1, 0, 3), output.narrow(1, 3, 3));
+    let log_std: Tensor = (raw.tanh() + 1.0) * 3.5 - 5.0;
+    let x = &mean + log_std.exp() * noise;
+    let action = x.tanh();
+    let log_normal: Tensor =
+        noise.square() * -0.5 - &log_std - 0.5 * (2.0 * std::f64::consts::PI).ln();
+    let slope: Tensor = 1.0 - action.square();
+    let log_slope = slope.log();
+    let log_probability =
+        (log_normal - log_slope).sum_dim_intlist([1_i64].as_slice(), true, Kind::Double);
+    (action, log_probability)
+}
+
+fn largest_relative_error(ours: &Tensor, theirs: &Tensor) -> f64 {
+    let scale = theirs.abs().max().double_value(&[]);
+    (ours - theirs).abs().max().double_value(&[]) / scale
+}
+
+/// In f64, so that 1e-6 is far above rounding.
+#[test]
+fn the_written_out_gradients_are_autograds() {
+    for layer_norm in [false, true] {
+        let config = small(layer_norm);
+        let mut sac = Sac::with_kind(&config, SIZES, 3, DOUBLE);
+        for step in 0..5 {
+            sac.update(&batch(20, step)); // away from zero biases
+        }
+        let actor_shape = NetShape::new(1, 5, &config.hidden, 6);
+        let critic_shape = NetShape {
+            layer_norm,
+            ..NetShape::new(2, 8, &config.hidden, 1)
+        };
+        let rows = sac.rows(&batch(20, 9));
+        let noise = sac.noise(20, &mut Rng::new(1, Stream::Test, 1));
+        let next_noise = sac.noise(20, &mut Rng::new(1, Stream::Test, 2));
+        let alpha = 0.2;
+        let actor = sac.actor.parameters.values.copy().set_requires_grad(true);
+        let critic = sac.critic.parameters.values.copy().set_requires_grad(true);
+
+        let next = reference_forward(&actor_shape, &actor, &rows.next_observation);
+        let (next_action, next_log) = reference_policy(&next, &next_noise);
+        let pair = Tensor::cat(&[&rows.next_observation, &next_action], 1);
+        let next_q = reference_forward(&critic_shape, &sac.target_values, &pair);
+        let value = next_q.amin([0_i64].as_slice(), false) - next_log * alpha;
+        let target = (&rows.reward + &rows.not_terminal * value * config.discount).detach();
+        let q = reference_forward(&critic_shape, &critic, &rows.state_action);
+        let loss = (&q - &target).square().mean(None) * 2.0;
+        let ours = sac.bellman_target(&rows, &next_noise, alpha);
+        assert!(largest_relative_error(&ours, &target) < 1e-9);
+        let (critic_loss, _) = sac.critic_gradient(&rows, &ours);
+        assert!((critic_loss - loss.double_value(&[])).abs() < 1e-9);
+        loss.backward();
+        let error = largest_relative_error(&sac.critic.parameters.gradient, &critic.grad());
+        assert!(
+            error < 1e-6,
+            "critic off by {error} (layer norm {layer_norm})"
+        );
+
+        let output = reference_forward(&actor_shape, &actor, &rows.observation);
+        let (action, log_probability) = reference_policy(&output, &noise);
+        let pair = Tensor::cat(&[&rows.observation, &action], 1);
+        let q = reference_forward(&critic_shape, &sac.critic.parameters.values, &pair);
+        let loss = (log_probability * alpha - q.amin([0_i64].as_slice(), false)).mean(None);
+        let (actor_loss, _) = sac.actor_gradient(&rows, &noise, alpha);
+        assert!((actor_loss - loss.double_value(&[])).abs() < 1e-9);
+        loss.backward();
+        let error = largest_relative_error(&sac.actor.parameters.gradient, &actor.grad());
+        assert!(
+            error < 1e-6,
+            "actor off by {error} (layer norm {layer_norm})"
+        );
+    }
+}
+
+fn fingerprint(sac: &Sac) -> String {
+    let mut archive = Archive::new();
+    sac.save(&mut archive);
+    archive.fingerprint()
+}
+
+#[test]
+fn an_interrupted_agent_goes_on_bit_for_bit() {
+    let config = small(true);
+    let new = || Sac::new(&config, SIZES.0, SIZES.1, 3, Device::CPU);
+    let mut uninterrupted = new();
+    let mut archive = Archive::new();
+    for step in 0..8 {
+        if step == 2 {
+            uninterrupted.reset_critic();
+        }
+        if step == 5 {
+            uninterrupted.save(&mut archive);
+        }
+        uninterrupted.update(&batch(20, step));
+    }
+    let mut resumed = new();
+    resumed.load(&archive).expect("loads");
+    for step in 5..8 {
+        resumed.update(&batch(20, step));
+    }
+    assert_eq!(fingerprint(&resumed), fingerprint(&uninterrupted));
+    resumed.reset_critic();
+    uninterrupted.reset_critic();
+    assert_eq!(fingerprint(&resumed), fingerprint(&uninterrupted));
+}
+
+#[test]
+fn a_checkpoint_of_another_network_is_refused() {
+    let mut archive = Archive::new();
+    Sac::new(&small(false), 5, 3, 3, Device::CPU).save(&mut archive);
+    let mut other = Sac::new(&small(false), 6, 3, 3, Device::CPU);
+    let error = other.load(&archive).expect_err("another task").to_string();
+    assert!(error.contains("sac.actor"), "{error}");
+}
+
+#[test]
+fn a_reset_replaces_the_critics_and_nothing_else() {
+    let mut sac = Sac::new(&small(false), SIZES.0, SIZES.1, 3, Device::CPU);
+    sac.update(&batch(20, 0));
+    let sections = |sac: &Sac| {
+        let (actor, critic) = (&sac.actor.parameters.values, &sac.critic.parameters.values);
+        (to_vec(actor), to_vec(critic), to_vec(&sac.target_values))
+    };
+    let before = sections(&sac);
+    sac.reset_critic();
+    let after = sections(&sac);
+    assert_eq!(before.0, after.0);
+    assert_ne!(before.1, after.1);
+    assert_eq!(after.1, after.2);
+}
+
+/// A one-step task whose best action is ½ in each coordinate.
+#[test]
+fn the_agent_finds_the_better_action() {
+    let config = SacConfig {
+        discount: 0.0,
+        initial_temperature: 0.01,
+        actor_learning_rate: 3e-3,
+        critic_learning_rate: 3e-3,
+        ..small(true)
+    };
+    let mut sac = Sac::new(&config, 1, 1, 3, Device::CPU);
+    let n = 64;
+    for step in 0..400 {
+        let mut rng = Rng::new(5, Stream::Test, step);
+        let action: Vec<f32> = (0..n).map(|_| rng.uniform_in(-1.0, 1.0) as f32).collect();
+        let reward = action.iter().map(|a| -(a - 0.5).powi(2)).collect();
+        sac.update(&Batch {
+            observation: vec![1.0; n],
+            action,
+            reward,
+            next_observation: vec![1.0; n],
+            not_terminal: vec![0.0; n],
+        });
+    }
+    let action = sac.act(&[1.0], Act::Mean)[0];
+    assert!((action - 0.5).abs() < 0.15, "{action}");
+    let sampled = sac.act(&[1.0; 8], Act::Sample { step: 3 });
+    assert_eq!(sampled, sac.act(&[1.0; 8], Act::Sample { step: 3 }));
+    assert_ne!(sampled, sac.act(&[1.0; 8], Act::Sample { step: 4 }));
+}

@@ -175,3 +175,39 @@ fn forward_by_tensors(x: &Tensor, y: &Tensor, outputs: (&mut Tensor, &mut Tensor
     }
     let _ = apart.sqrt_();
 }
+
+#[cfg(test)]
+mod tests {
+    use domain::random::{Rng, Stream};
+
+    use super::*;
+    use crate::net::matrix;
+
+    const DOUBLE: (Kind, Device) = (Kind::Double, Device::Cpu);
+
+    fn normals(columns: i64, step: u64) -> Tensor {
+        let mut values = vec![0.0; 10 * columns as usize];
+        Rng::new(8, Stream::Test, step).fill_normal(&mut values);
+        matrix(&values, columns, DOUBLE)
+    }
+
+    #[test]
+    fn both_roads_to_all_distances_agree() {
+        let (x, y) = (normals(6, 3), normals(6, 4));
+        let loops = Pairwise::new(&x, &y);
+        let square = || Tensor::empty([10, 10], DOUBLE);
+        let (mut ahead, mut which, mut apart) = (square(), square(), square());
+        forward_by_tensors(&x, &y, (&mut ahead, &mut which, &mut apart));
+        let close = |a: &Tensor, b: &Tensor| (a - b).abs().max().double_value(&[]) < 1e-12;
+        assert!(close(&loops.distance(), &(ahead + apart)));
+        assert!(close(
+            &loops.distance(),
+            &distance(&x.unsqueeze(1), &y.unsqueeze(0))
+        ));
+        assert!(close(&loops.which, &which));
+        let slope = normals(10, 5);
+        let (a, b) = loops.ahead_backward::<f64>(&slope);
+        let (c, d) = loops.ahead_backward_by_tensors(&slope);
+        assert!(close(&a, &c) && close(&b, &d));
+    }
+}
