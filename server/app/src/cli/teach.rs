@@ -1,0 +1,292 @@
+//! `stair teach`: a scripted teacher that answers over HTTP, as a person's page would.
+
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+use anyhow::Context as _;
+use domain::answer::{Preference, Which};
+use domain::environment::TaskReward;
+use domain::episode::{EpisodeId, Segment, SegmentRecord};
+use domain::query::{OfferedQuery, QueryKey};
+use domain::teacher::Judge;
+use indicatif::{ProgressBar, ProgressStyle};
+use serde::Deserialize;
+use serde_json::{Value, json};
+
+use super::client::{Client, Refused, path_segment};
+
+/// Queries asked for at once.
+const LEASES: u32 = 50;
+/// Pause while the agent collects experience or fits its reward.
+const WAIT: Duration = Duration::from_millis(200);
+/// How long a server may be away in the middle, for example while it is restarted.
+const PATIENCE: Duration = Duration::from_secs(120);
+
+/// Answer a run's queries over HTTP with a scripted teacher, until the run needs no more
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  stair teach --server http://127.0.0.1:8080 --run 1 --teacher oracle
+  stair teach --server http://127.0.0.1:8080 --run 1 --teacher mistaken --seed 3")]
+pub struct Args {
+    /// The server's address
+    #[arg(long, value_name = "URL", default_value = "http://127.0.0.1:8080")]
+    server: String,
+    /// The run's id, as its page's address has it
+    #[arg(long, value_name = "ID")]
+    run: String,
+    /// Who answers: oracle, mistaken, coin
+    #[arg(long, default_value = "oracle")]
+    teacher: String,
+    /// A teacher token of the run [default: STAIR_TEACHER_TOKEN, or one that the server gives to
+    /// programs on its own machine]
+    #[arg(long)]
+    token: Option<String>,
+    /// Of the teacher's mistakes [default: the run's]
+    #[arg(long)]
+    seed: Option<u64>,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// [`BadInput`] for a server that cannot be reached, an unknown run or teacher, a wrong token;
+/// anything else that the server refuses.
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    super::train::judge(&args.teacher, 0)?; // a wrong name is said before anything is sent
+    let mut client = Client::new(&args.server, PATIENCE)?;
+    let run = format!("/api/v1/runs/{}", path_segment(&args.run)?);
+    let told = client.get(&run)?;
+    let token = match args
+        .token
+        .or_else(|| std::env::var("STAIR_TEACHER_TOKEN").ok())
+    {
+        Some(token) => token,
+        None => new_token(&mut client, &run)?,
+    };
+    client.authorize(token);
+    let seed = args.seed.or(told["seed"].as_u64()).unwrap_or_default();
+    let mut teacher = Remote {
+        client,
+        run,
+        judge: super::train::judge(&args.teacher, seed)?,
+        n_answered: 0,
+    };
+    let started = Instant::now();
+    let end = teacher.answer_all()?;
+    println!(
+        "Answered {} queries in {:.0} s. {end}",
+        teacher.n_answered,
+        started.elapsed().as_secs_f64()
+    );
+    Ok(ExitCode::SUCCESS)
+}
+
+fn new_token(client: &mut Client, run: &str) -> anyhow::Result<String> {
+    let told = client.post(&format!("{run}/teacher-tokens"), &json!({}))?;
+    told["token"]
+        .as_str()
+        .map(str::to_owned)
+        .context("the server gave no teacher token")
+}
+
+/// A judge at the end of a wire.
+struct Remote {
+    client: Client,
+    run: String,
+    judge: Box<dyn Judge>,
+    n_answered: u32,
+}
+
+/// The part of a lease that a program needs.
+#[derive(Deserialize)]
+struct Lease {
+    lease_id: Id,
+    query_id: Id,
+    question: String,
+}
+
+/// Ids are opaque: numbers or strings.
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum Id {
+    Number(i64),
+    Text(String),
+}
+
+impl std::fmt::Display for Id {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Number(number) => write!(f, "{number}"),
+            Self::Text(text) => f.write_str(text),
+        }
+    }
+}
+
+/// Ground truth about a query, as this teacher's sides show it.
+#[derive(Deserialize)]
+struct TaskRewards {
+    left: Vec<f64>,
+    right: Vec<f64>,
+    left_is: Which,
+    session: u32,
+    index: u32,
+    same_stage: Option<bool>,
+}
+
+impl Remote {
+    /// Answers whatever is offered until nothing will be; says how it ended.
+    fn answer_all(&mut self) -> anyhow::Result<String> {
+        let bar = ProgressBar::new(0);
+        if let Ok(style) = ProgressStyle::with_template("{bar:30} {pos}/{len} answers  {msg}") {
+            bar.set_style(style);
+        }
+        loop {
+            let told = self
+                .client
+                .post(&format!("{}/leases", self.run), &json!({"count": LEASES}))?;
+            show(&bar, &told);
+            let leases: Vec<Lease> = serde_json::from_value(told["leases"].clone())
+                .context("the server's leases are of another kind")?;
+            for lease in &leases {
+                self.answer(lease)?;
+                bar.inc(1);
+            }
+            let state = &told["state"];
+            let message = state["message"].as_str().unwrap_or_default().to_owned();
+            match state["kind"].as_str() {
+                _ if !leases.is_empty() => {}
+                Some("done") => {
+                    bar.finish_and_clear();
+                    return Ok(message);
+                }
+                Some("failed") => anyhow::bail!("the run cannot go on: {message}"),
+                _ => std::thread::sleep(WAIT),
+            }
+        }
+    }
+
+    fn answer(&mut self, lease: &Lease) -> anyhow::Result<()> {
+        let truth = self
+            .client
+            .get(&format!("/api/v1/queries/{}/task-rewards", lease.query_id))?;
+        let truth: TaskRewards =
+            serde_json::from_value(truth).context("the task rewards are of another kind")?;
+        let body = match lease.question.as_str() {
+            "preference" => preference(self.judge.as_ref(), truth),
+            "same_stage" => same_stage(&truth),
+            other => anyhow::bail!(
+                "the server asks '{other}', which this version of the program cannot answer"
+            ),
+        };
+        match self
+            .client
+            .put(&format!("/api/v1/leases/{}/answer", lease.lease_id), &body)
+        {
+            Ok(_) => self.n_answered += 1,
+            // Somebody else answered it first: theirs counts.
+            Err(error)
+                if error
+                    .downcast_ref::<Refused>()
+                    .is_some_and(|r| matches!(r.status, 409 | 410)) => {}
+            Err(error) => return Err(error),
+        }
+        Ok(())
+    }
+}
+
+fn show(bar: &ProgressBar, told: &Value) {
+    let progress = &told["progress"];
+    if let (Some(answered), Some(budget)) =
+        (progress["answered"].as_u64(), progress["budget"].as_u64())
+    {
+        bar.set_length(budget);
+        bar.set_position(answered);
+    }
+    bar.set_message(
+        told["state"]["message"]
+            .as_str()
+            .unwrap_or_default()
+            .to_owned(),
+    );
+}
+
+fn preference(judge: &dyn Judge, truth: TaskRewards) -> Value {
+    let left_is = truth.left_is;
+    let (first, second) = match left_is {
+        Which::First => (truth.left, truth.right),
+        Which::Second => (truth.right, truth.left),
+    };
+    let query = OfferedQuery {
+        key: QueryKey {
+            session: truth.session,
+            index: truth.index,
+        },
+        first: record(&first),
+        second: record(&second),
+        asks_same_stage: false,
+        disagreement: None,
+        stage_gap: None,
+    };
+    match judge.judge(&query) {
+        Some(Preference::Prefer(which)) => {
+            json!({"answer": if which == left_is { "left" } else { "right" }})
+        }
+        Some(Preference::Equal) => json!({"answer": "equal"}),
+        None => json!({"answer": "skip", "reason": "the teacher cannot tell"}),
+    }
+}
+
+fn same_stage(truth: &TaskRewards) -> Value {
+    match truth.same_stage {
+        Some(true) => json!({"answer": "same"}),
+        Some(false) => json!({"answer": "different"}),
+        None => json!({"answer": "skip", "reason": "the task does not know its stages"}),
+    }
+}
+
+/// What a judge looks at: the rewards. Where the segment lies is not known out here.
+fn record(task_rewards: &[f64]) -> SegmentRecord {
+    SegmentRecord {
+        segment: Segment {
+            episode: EpisodeId(0),
+            start: 0,
+            len: task_rewards.len() as u32,
+        },
+        poses: Vec::new(),
+        task_rewards: task_rewards.iter().copied().map(TaskReward).collect(),
+        stages: Vec::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use domain::teacher::Oracle;
+
+    fn truth(left: &[f64], right: &[f64], left_is: Which) -> TaskRewards {
+        let (left, right) = (left.to_vec(), right.to_vec());
+        TaskRewards {
+            left,
+            right,
+            left_is,
+            session: 0,
+            index: 0,
+            same_stage: None,
+        }
+    }
+
+    #[test]
+    fn the_side_with_the_larger_return_is_pressed_and_a_tie_goes_to_the_first_segment() {
+        let pressed = |t: TaskRewards| preference(&Oracle, t)["answer"].clone();
+        assert_eq!(
+            pressed(truth(&[1.0, 2.0], &[0.0, 9.0], Which::First)),
+            "right"
+        );
+        assert_eq!(
+            pressed(truth(&[1.0, 2.0], &[0.0, 9.0], Which::Second)),
+            "right"
+        );
+        assert_eq!(pressed(truth(&[1.0], &[1.0], Which::First)), "left");
+        assert_eq!(pressed(truth(&[1.0], &[1.0], Which::Second)), "right");
+    }
+}
