@@ -1,12 +1,10 @@
 //! Control steps per second of every task, one thread, CPU time:
 //! `cargo run --release -p sim --example bench [SECONDS]`.
 //!
-//! Each task plays whole episodes, resets included, once with random actions and once with its
-//! expert's; actions are drawn outside the clock's reach only as far as they are cheap, so the
-//! figures are what a learner that acts for free would get.
+//! Each task plays whole episodes, resets and the policy's own cost included, once with random
+//! actions and once with its expert's: contacts make the second one slower.
 
 use std::fs;
-use std::time::Duration;
 
 use domain::random::{Rng, Stream};
 use sim::tasks::{Task, tasks};
@@ -32,7 +30,7 @@ fn main() {
 
 fn steps_per_second(task: &Task, seconds: f64, policy: &mut dyn FnMut(&[f32]) -> Vec<f32>) -> f64 {
     let mut environment = (task.make)();
-    let (start, mut n_steps, mut seed) = (cpu_time(), 0_u32, 0);
+    let (start, mut n_steps, mut seed) = (cpu_seconds(), 0_u32, 0);
     loop {
         let mut observation = environment.reset(seed);
         for _ in 0..environment.spec().episode_len {
@@ -43,7 +41,7 @@ fn steps_per_second(task: &Task, seconds: f64, policy: &mut dyn FnMut(&[f32]) ->
             n_steps += 1;
         }
         seed += 1;
-        let spent = (cpu_time() - start).as_secs_f64();
+        let spent = cpu_seconds() - start;
         if spent >= seconds {
             return f64::from(n_steps) / spent;
         }
@@ -52,8 +50,8 @@ fn steps_per_second(task: &Task, seconds: f64, policy: &mut dyn FnMut(&[f32]) ->
 
 /// CPU time of this thread, from the first field of Linux's `schedstat`, which counts
 /// nanoseconds; other work on the machine does not enter it.
-fn cpu_time() -> Duration {
+fn cpu_seconds() -> f64 {
     let text = fs::read_to_string("/proc/thread-self/schedstat").expect("Linux counts CPU time");
     let nanoseconds = text.split_whitespace().next().expect("three numbers");
-    Duration::from_nanos(nanoseconds.parse().expect("a number"))
+    nanoseconds.parse::<f64>().expect("a number") * 1e-9
 }

@@ -18,7 +18,7 @@
 //!
 //! # Taking and dropping
 //! o is the jaws' openness: 1 open, 0.45 around the object, 0 closed on nothing; a full command
-//! moves it by 0.08 a step. The object is **between the jaws** when ‖b − j‖ ≤ 0.1 and o ≥ 0.45:
+//! moves it by 0.16 a step. The object is **between the jaws** when ‖b − j‖ ≤ 0.14 and o ≥ 0.45:
 //! jaws that came closed must open first. Closing to 0.45 with the object between them **takes**
 //! it: from then on it is lifted and drawn to j. Opening to 0.6 **drops** it where it is; it is
 //! also lost when something holds it back by more than 0.2.
@@ -49,7 +49,7 @@
 //! | ‖g − b‖ ≤ ρ | 10 |
 //! | the object is held | 5 + 5 · near(‖g − b‖ − ρ) |
 //! | it is between the jaws | 3 + (1 − o)/0.55, at most 4 |
-//! | otherwise | 3 · near(max(0, ‖b − j‖ − 0.1)) · (0.6 + 0.4 o) |
+//! | otherwise | 3 · near(max(0, ‖b − j‖ − 0.14)) · (0.6 + 0.4 o) |
 //!
 //! Each row pays at least as much as the best of the rows below it, so waiting before a later
 //! stage never pays, nor does dropping the object before the goal.
@@ -61,18 +61,18 @@
 //! `return` while the object is held or at the goal; otherwise `fetch` while ‖b − j‖ ≤ 0.35, and
 //! `go` beyond. For evaluation only.
 
-use domain::environment::{
-    EnvError, EnvSpec, Environment, EpisodeEnd, Step, TaskReward, checked_action,
-};
+use domain::environment::{EnvError, EnvSpec, Environment, EpisodeEnd, Step, checked_action};
 use domain::random::{Rng, Stream};
 use rapier3d::prelude::{ColliderBuilder, LockedAxes, RigidBodyBuilder, RigidBodyHandle, Vector};
 use serde::{Deserialize, Serialize};
 
+use self::view::{View, norm};
 use super::Task;
-use crate::robots::planar_robot::{PlanarRobot, PlanarState, TOP_SPEED};
+use crate::robots::planar_robot::PlanarRobot;
 use crate::world::{self, Timing, World};
 
 mod picture;
+mod view;
 
 /// The registry's line.
 pub const TASK: Task = Task {
@@ -102,7 +102,7 @@ const OBJECT_MASS: f32 = 0.2;
 const OBJECT_DAMPING: f32 = 5.0;
 const GOAL_RADIUS: f32 = 0.14;
 /// Between the jaws: this close to the point between them.
-const JAW_ZONE: f32 = 0.1;
+const JAW_ZONE: f32 = 0.14;
 /// Openness of jaws that hold the object.
 const HELD_OPENNESS: f32 = 0.45;
 /// Openness that lets a held object go.
@@ -147,18 +147,6 @@ struct State {
     is_held: bool,
     seed: u64,
     n_steps: u32,
-}
-
-/// What reward, success, stage and observation depend on.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct View {
-    robot: PlanarState,
-    openness: f32,
-    is_held: bool,
-    /// b − j, metres.
-    jaws_to_object: [f32; 2],
-    /// g − b, metres.
-    object_to_goal: [f32; 2],
 }
 
 impl GoFetchReturn {
@@ -302,66 +290,6 @@ impl State {
     }
 }
 
-impl View {
-    fn observation(&self) -> Vec<f32> {
-        let (position, velocity) = (self.robot.position, self.robot.velocity);
-        let (object, goal) = (self.jaws_to_object, self.object_to_goal);
-        let close_up = object.map(|x| (x / CLOSE_UP).clamp(-1.0, 1.0));
-        vec![
-            position[0] / FLOOR_HALF,
-            position[1] / FLOOR_HALF,
-            velocity[0] / TOP_SPEED,
-            velocity[1] / TOP_SPEED,
-            self.robot.heading[0],
-            self.robot.heading[1],
-            2.0 * self.openness - 1.0,
-            if self.is_held { 1.0 } else { -1.0 },
-            object[0] / FLOOR_HALF,
-            object[1] / FLOOR_HALF,
-            close_up[0],
-            close_up[1],
-            goal[0] / FLOOR_HALF,
-            goal[1] / FLOOR_HALF,
-        ]
-    }
-
-    fn task_reward(&self) -> TaskReward {
-        let to_object = norm(self.jaws_to_object);
-        let to_goal = norm(self.object_to_goal);
-        TaskReward(f64::from(if self.is_success() {
-            10.0
-        } else if self.is_held {
-            5.0 + 5.0 * near(to_goal - GOAL_RADIUS)
-        } else if to_object <= JAW_ZONE && self.openness >= HELD_OPENNESS {
-            3.0 + (1.0 - self.openness) / (1.0 - HELD_OPENNESS)
-        } else {
-            3.0 * near((to_object - JAW_ZONE).max(0.0)) * (0.6 + 0.4 * self.openness)
-        }))
-    }
-
-    fn is_success(&self) -> bool {
-        norm(self.object_to_goal) <= GOAL_RADIUS
-    }
-
-    fn stage(&self) -> u8 {
-        if self.is_held || self.is_success() {
-            2
-        } else {
-            u8::from(norm(self.jaws_to_object) <= FETCH_DISTANCE)
-        }
-    }
-}
-
-/// Falls from 1 to 0 over the floor's diagonal, steeply at the end: a slope to follow from
-/// everywhere and a point to come to.
-fn near(distance: f32) -> f32 {
-    (0.6 * (1.0 - distance / 3.4) + 0.4 * (-distance / 0.2).exp()).max(0.0)
-}
-
-fn norm(v: [f32; 2]) -> f32 {
-    v[0].hypot(v[1])
-}
-
 /// Where everything stands when an episode begins.
 struct Start {
     robot: [f32; 2],
@@ -427,7 +355,7 @@ fn build_object(world: &mut World, position: [f32; 2]) -> RigidBodyHandle {
 
 /// Drives straight at the object with open jaws, closes them on it, drives straight to the goal.
 fn expert(observation: &[f32]) -> Vec<f32> {
-    let openness = (observation[6] + 1.0) / 2.0;
+    let openness = 0.5 + 0.5 * observation[6];
     let is_held = observation[7] > 0.0;
     let to_object = [observation[8] * FLOOR_HALF, observation[9] * FLOOR_HALF];
     let to_goal = [observation[12] * FLOOR_HALF, observation[13] * FLOOR_HALF];

@@ -1,5 +1,6 @@
 use super::*;
 use crate::expert::{Rollout, rollout};
+use crate::robots::planar_robot::PlanarState;
 
 type Policy<'a> = &'a mut dyn FnMut(&[f32]) -> Vec<f32>;
 

@@ -1,0 +1,80 @@
+//! What one moment means: observation, task reward, success and stage, as the parent module's
+//! tables state them.
+
+use domain::environment::TaskReward;
+
+use super::{CLOSE_UP, FETCH_DISTANCE, FLOOR_HALF, GOAL_RADIUS, HELD_OPENNESS, JAW_ZONE};
+use crate::robots::planar_robot::{PlanarState, TOP_SPEED};
+
+/// What reward, success, stage and observation depend on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct View {
+    pub(super) robot: PlanarState,
+    pub(super) openness: f32,
+    pub(super) is_held: bool,
+    /// b − j, metres.
+    pub(super) jaws_to_object: [f32; 2],
+    /// g − b, metres.
+    pub(super) object_to_goal: [f32; 2],
+}
+
+impl View {
+    pub(super) fn observation(&self) -> Vec<f32> {
+        let (position, velocity) = (self.robot.position, self.robot.velocity);
+        let (object, goal) = (self.jaws_to_object, self.object_to_goal);
+        let close_up = object.map(|x| (x / CLOSE_UP).clamp(-1.0, 1.0));
+        vec![
+            position[0] / FLOOR_HALF,
+            position[1] / FLOOR_HALF,
+            velocity[0] / TOP_SPEED,
+            velocity[1] / TOP_SPEED,
+            self.robot.heading[0],
+            self.robot.heading[1],
+            2.0 * self.openness - 1.0,
+            if self.is_held { 1.0 } else { -1.0 },
+            object[0] / FLOOR_HALF,
+            object[1] / FLOOR_HALF,
+            close_up[0],
+            close_up[1],
+            goal[0] / FLOOR_HALF,
+            goal[1] / FLOOR_HALF,
+        ]
+    }
+
+    pub(super) fn task_reward(&self) -> TaskReward {
+        let to_object = norm(self.jaws_to_object);
+        let to_goal = norm(self.object_to_goal);
+        TaskReward(f64::from(if self.is_success() {
+            10.0
+        } else if self.is_held {
+            5.0 + 5.0 * near(to_goal - GOAL_RADIUS)
+        } else if to_object <= JAW_ZONE && self.openness >= HELD_OPENNESS {
+            3.0 + (1.0 - self.openness) / (1.0 - HELD_OPENNESS)
+        } else {
+            3.0 * near((to_object - JAW_ZONE).max(0.0)) * (0.6 + 0.4 * self.openness)
+        }))
+    }
+
+    pub(super) fn is_success(&self) -> bool {
+        norm(self.object_to_goal) <= GOAL_RADIUS
+    }
+
+    pub(super) fn stage(&self) -> u8 {
+        if self.is_held || self.is_success() {
+            2
+        } else {
+            u8::from(norm(self.jaws_to_object) <= FETCH_DISTANCE)
+        }
+    }
+}
+
+/// Falls from 1 to 0 over the floor's diagonal, steeply at the end: a slope to follow from
+/// everywhere and a point to come to.
+fn near(distance: f32) -> f32 {
+    (0.6 * (1.0 - distance / 3.4) + 0.4 * (-distance / 0.2).exp()).max(0.0)
+}
+
+/// Length.
+pub(super) fn norm(v: [f32; 2]) -> f32 {
+    v[0].hypot(v[1])
+}
