@@ -37,6 +37,11 @@ pub async fn file(Path(path): Path<String>, headers: HeaderMap) -> Result<Respon
     Ok((common, bytes).into_response())
 }
 
+/// Whether there is such a file below `web/static`.
+pub fn contains(path: &str) -> bool {
+    FILES.binary_search_by_key(&path, |(name, _)| name).is_ok()
+}
+
 fn content_type(path: &str) -> &'static str {
     match path.rsplit_once('.').map(|(_, extension)| extension) {
         Some("js" | "mjs") => "text/javascript; charset=utf-8",

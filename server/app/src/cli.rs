@@ -6,6 +6,7 @@ use clap::{Parser, Subcommand};
 
 mod client;
 mod evaluate;
+mod export;
 mod golden;
 mod openapi;
 mod render;
@@ -37,6 +38,7 @@ enum Command {
     Render(render::Args),
     Golden(golden::Args),
     Tasks(tasks::Args),
+    Export(export::Args),
     Openapi(openapi::Args),
 }
 
@@ -75,6 +77,7 @@ pub fn main() -> ExitCode {
         Command::Render(args) => render::run(args),
         Command::Golden(args) => golden::run(&args),
         Command::Tasks(args) => tasks::run(args),
+        Command::Export(args) => export::run(args),
         Command::Openapi(args) => openapi::run(&args),
     };
     result.unwrap_or_else(|error| {

@@ -10,8 +10,14 @@
 
 use std::process::ExitCode;
 
+mod api;
 mod assets;
 mod cli;
+mod extract;
+mod guard;
+mod live;
+mod pages;
+mod policy;
 mod problem;
 mod router;
 mod state;

@@ -1,9 +1,15 @@
 //! What goes wrong, told over HTTP: RFC 9457 problems.
 
 use axum::Json;
+use axum::extract::rejection::{JsonRejection, PathRejection, QueryRejection};
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
+use lab::config::ConfigError;
 use serde::Serialize;
+use serde_json::{Value, json};
+use store::{StoreError, rfc3339};
+
+use crate::live::LiveError;
 
 /// A problem as clients receive it, `application/problem+json`.
 ///
@@ -25,17 +31,12 @@ pub struct Problem {
     /// The answer that exists already, where that is the problem.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(value_type = Option<Object>)]
-    pub existing: Option<serde_json::Value>,
+    pub existing: Option<Value>,
 }
 
 impl Problem {
     /// A problem of this kind; where and which request is filled in at the edge.
-    pub fn new(
-        status: StatusCode,
-        kind: &'static str,
-        title: &'static str,
-        detail: impl Into<String>,
-    ) -> Self {
+    pub fn new(status: StatusCode, kind: &'static str, title: &'static str, detail: impl Into<String>) -> Self {
         Self {
             r#type: kind,
             title,
@@ -49,12 +50,64 @@ impl Problem {
 
     /// 404: nothing lives at this address.
     pub fn no_such_page(path: &str) -> Self {
-        Self::new(
-            StatusCode::NOT_FOUND,
-            "/problems/no-such-page",
-            "There is nothing here",
-            format!("{path} is not an address of this server. The list of runs is at /."),
-        )
+        let detail = format!("{path} is not an address of this server. The list of runs is at /.");
+        Self::new(StatusCode::NOT_FOUND, "/problems/no-such-page", "There is nothing here", detail)
+    }
+
+    /// 405: the address takes other methods.
+    pub fn wrong_method(path: &str) -> Self {
+        let detail = format!("{path} does not take this method; /api/v1/openapi.json says what it takes.");
+        Self::new(StatusCode::METHOD_NOT_ALLOWED, "/problems/wrong-method", "Not this way", detail)
+    }
+
+    /// 404: no run has this number.
+    pub fn run_not_found(id: impl std::fmt::Display) -> Self {
+        let detail = format!("There is no run {id}. The list of runs is at /.");
+        Self::new(StatusCode::NOT_FOUND, "/problems/run-not-found", "There is no such run", detail)
+    }
+
+    /// 401: nobody has said who answers.
+    pub fn who_are_you() -> Self {
+        let detail = "Say who answers first: POST /api/v1/labelers with a name, or send a teacher token.";
+        Self::new(StatusCode::UNAUTHORIZED, "/problems/labeler-unknown", "Who is answering?", detail)
+    }
+
+    /// 401: the server listens on more than its own machine, and the request brought no token.
+    pub fn token_needed() -> Self {
+        let detail = "This server needs a token: open /enter?token=… once, or send it as Authorization: Bearer.";
+        Self::new(StatusCode::UNAUTHORIZED, "/problems/token-needed", "This server needs a token", detail)
+    }
+
+    /// 403: the token is not for this.
+    pub fn teachers_only() -> Self {
+        let detail = "Only a program with a teacher token of this run may do this; labelers never may.";
+        Self::new(StatusCode::FORBIDDEN, "/problems/teachers-only", "Not for labelers", detail)
+    }
+
+    /// 403: the request comes from another site.
+    pub fn foreign(detail: impl Into<String>) -> Self {
+        Self::new(StatusCode::FORBIDDEN, "/problems/foreign-request", "Refused: it comes from elsewhere", detail)
+    }
+
+    /// 400 or 415 or 422: a body or parameter that is not what the address takes.
+    pub fn bad_request(status: StatusCode, detail: impl Into<String>) -> Self {
+        Self::new(status, "/problems/bad-request", "The request cannot be read", detail)
+    }
+
+    /// 422: settings that cannot be used.
+    pub fn unusable_settings(detail: impl Into<String>) -> Self {
+        Self::new(StatusCode::UNPROCESSABLE_ENTITY, "/problems/unusable-settings", "These settings cannot be used", detail)
+    }
+
+    /// 500: a page could not be written.
+    pub fn page_failed() -> Self {
+        Self::internal()
+    }
+
+    /// 500: a bug, or a machine in trouble; the log has the rest.
+    pub fn internal() -> Self {
+        let detail = "The server could not do it; its log says why, under the id of this request.";
+        Self::new(StatusCode::INTERNAL_SERVER_ERROR, "/problems/internal", "The server failed", detail)
     }
 }
 
@@ -63,10 +116,94 @@ impl IntoResponse for Problem {
         let status = StatusCode::from_u16(self.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
         let mut response = (status, Json(&self)).into_response();
         let content_type = header::HeaderValue::from_static("application/problem+json");
-        response
-            .headers_mut()
-            .insert(header::CONTENT_TYPE, content_type);
+        response.headers_mut().insert(header::CONTENT_TYPE, content_type);
         response.extensions_mut().insert(self);
         response
+    }
+}
+
+impl From<StoreError> for Problem {
+    fn from(error: StoreError) -> Self {
+        let detail = error.to_string();
+        let problem = |status, kind, title| Self::new(status, kind, title, detail.clone());
+        match error {
+            StoreError::Missing { what: "run", id } => Self::run_not_found(id),
+            StoreError::Missing { .. } => problem(StatusCode::NOT_FOUND, "/problems/not-found", "There is no such thing"),
+            StoreError::NotYours => problem(StatusCode::FORBIDDEN, "/problems/not-your-lease", "Not your lease"),
+            StoreError::WrongQuestion { .. } => {
+                problem(StatusCode::UNPROCESSABLE_ENTITY, "/problems/wrong-question", "Not an answer to this question")
+            }
+            StoreError::NoReason => {
+                problem(StatusCode::UNPROCESSABLE_ENTITY, "/problems/reason-needed", "A skip needs a reason")
+            }
+            StoreError::NotSupersedable(_) => problem(
+                StatusCode::UNPROCESSABLE_ENTITY,
+                "/problems/not-supersedable",
+                "That answer cannot be replaced here",
+            ),
+            StoreError::Different(existing) => Self {
+                existing: Some(json!({
+                    "answer_id": existing.id, "answer": existing.pressed, "sequence": existing.sequence,
+                    "stored_at": rfc3339(existing.stored_at_ms),
+                })),
+                ..problem(StatusCode::CONFLICT, "/problems/already-answered", "Already answered differently")
+            },
+            StoreError::Taken => problem(StatusCode::GONE, "/problems/lease-taken", "Somebody else has this question now"),
+            StoreError::Rule(rule) if rule.contains("labeler_name_not_empty") => Self::bad_request(
+                StatusCode::UNPROCESSABLE_ENTITY,
+                "A name has at least one and at most 80 letters.",
+            ),
+            StoreError::Full | StoreError::ReadOnly => {
+                problem(StatusCode::INSUFFICIENT_STORAGE, "/problems/storage", "The answer could not be stored")
+            }
+            StoreError::Closed => {
+                problem(StatusCode::SERVICE_UNAVAILABLE, "/problems/closing", "The server is closing")
+            }
+            other => {
+                tracing::error!("{other}");
+                Self::internal()
+            }
+        }
+    }
+}
+
+impl From<LiveError> for Problem {
+    fn from(error: LiveError) -> Self {
+        let detail = error.to_string();
+        match error {
+            LiveError::Store(error) => error.into(),
+            LiveError::Closing => {
+                Self::new(StatusCode::SERVICE_UNAVAILABLE, "/problems/closing", "The server is closing", detail)
+            }
+            LiveError::Thread(_) => {
+                tracing::error!("{detail}");
+                Self::internal()
+            }
+            _ => Self::new(StatusCode::CONFLICT, "/problems/run-state", "The run cannot do that now", detail),
+        }
+    }
+}
+
+impl From<ConfigError> for Problem {
+    fn from(error: ConfigError) -> Self {
+        Self::unusable_settings(error.to_string())
+    }
+}
+
+impl From<JsonRejection> for Problem {
+    fn from(rejection: JsonRejection) -> Self {
+        Self::bad_request(rejection.status(), rejection.body_text())
+    }
+}
+
+impl From<PathRejection> for Problem {
+    fn from(rejection: PathRejection) -> Self {
+        Self::bad_request(StatusCode::NOT_FOUND, rejection.body_text())
+    }
+}
+
+impl From<QueryRejection> for Problem {
+    fn from(rejection: QueryRejection) -> Self {
+        Self::bad_request(rejection.status(), rejection.body_text())
     }
 }

@@ -1,7 +1,10 @@
 //! What every handler can reach.
 
-use std::path::PathBuf;
 use std::sync::Arc;
+
+use store::Store;
+
+use crate::live::Live;
 
 /// Cheap to clone; one per server.
 #[derive(Clone)]
@@ -9,14 +12,18 @@ pub struct AppState(Arc<Inner>);
 
 /// What the server holds.
 pub struct Inner {
-    /// Folder with the database, the clips and the runs.
-    pub data: PathBuf,
+    /// Runs, queries, clips, answers.
+    pub store: Store,
+    /// The runs that are up.
+    pub live: Live,
+    /// Whether requests must bring a token: the server listens on more than its own machine.
+    pub needs_token: bool,
 }
 
 impl AppState {
-    /// The state of a server over `data`.
-    pub fn new(data: PathBuf) -> Self {
-        Self(Arc::new(Inner { data }))
+    /// The state of a server.
+    pub fn new(store: Store, live: Live, needs_token: bool) -> Self {
+        Self(Arc::new(Inner { store, live, needs_token }))
     }
 }
 

@@ -83,6 +83,47 @@ pub struct Label {
     pub stored_at: String,
 }
 
+impl Label {
+    /// Names of the columns, in order.
+    pub const COLUMNS: &[&str] = &[
+        "answer_id",
+        "run_id",
+        "task",
+        "method",
+        "seed",
+        "question",
+        "sequence",
+        "query_id",
+        "session",
+        "position",
+        "labeler",
+        "pressed",
+        "meaning",
+        "left_is",
+        "reason",
+        "supersedes",
+        "is_current",
+        "first_episode",
+        "first_start",
+        "first_clip",
+        "second_episode",
+        "second_start",
+        "second_clip",
+        "segment_len",
+        "disagreement",
+        "stage_gap",
+        "guidance_sha256",
+        "visible_ms",
+        "hidden_ms",
+        "loops",
+        "seeks",
+        "speed",
+        "dropped_frames",
+        "input",
+        "stored_at",
+    ];
+}
+
 /// An answered query to look at again.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AnsweredPair {

@@ -237,12 +237,14 @@ impl Store {
     ) -> Result<(), StoreError> {
         self.write(move |t| {
             Box::pin(async move {
-                sqlx::query("update run set step = ?, n_labels = coalesce(?, n_labels) where id = ?")
-                    .bind(step.cast_signed())
-                    .bind(n_labels)
-                    .bind(run.0)
-                    .execute(&mut *t.connection)
-                    .await?;
+                sqlx::query(
+                    "update run set step = ?, n_labels = coalesce(?, n_labels) where id = ?",
+                )
+                .bind(step.cast_signed())
+                .bind(n_labels)
+                .bind(run.0)
+                .execute(&mut *t.connection)
+                .await?;
                 Ok(())
             })
         })

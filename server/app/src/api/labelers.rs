@@ -1,0 +1,71 @@
+//! `/api/v1/labelers`: who answers.
+
+use axum::Json;
+use axum::extract::{Query, State};
+use axum::http::{StatusCode, header};
+use axum::response::{IntoResponse, Redirect, Response};
+use serde::{Deserialize, Serialize};
+use store::{Secret, TokenKind};
+use utoipa::ToSchema;
+
+use crate::extract::{ACCESS_COOKIE, Body, LABELER_COOKIE, set_cookie};
+use crate::problem::Problem;
+use crate::state::AppState;
+
+/// Who wants to answer.
+#[derive(Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NewLabeler {
+    /// 1 to 80 letters; the same name from another browser is the same labeler.
+    name: String,
+}
+
+/// Who answers.
+#[derive(Serialize, ToSchema)]
+pub struct LabelerView {
+    /// Number.
+    id: i64,
+    /// As they typed it.
+    name: String,
+}
+
+/// Says who answers in this browser; the reply sets a cookie.
+///
+/// # Errors
+/// A name that is none.
+#[utoipa::path(post, path = "/api/v1/labelers", tag = "labelers", request_body = NewLabeler,
+    responses((status = 201, body = LabelerView), (status = 422, body = Problem)))]
+pub async fn create(State(app): State<AppState>, Body(new): Body<NewLabeler>) -> Result<Response, Problem> {
+    let (cookie, view) = sign_in(&app, &new.name).await?;
+    Ok((StatusCode::CREATED, [(header::SET_COOKIE, cookie)], Json(view)).into_response())
+}
+
+/// The cookie for a browser whose labeler has this name.
+///
+/// # Errors
+/// A name that is none.
+pub async fn sign_in(app: &AppState, name: &str) -> Result<(String, LabelerView), Problem> {
+    let (labeler, secret) = app.store.sign_in(name).await?;
+    let view = LabelerView { id: labeler.id.0, name: labeler.name };
+    Ok((set_cookie(LABELER_COOKIE, &secret), view))
+}
+
+/// `?token=…`
+#[derive(Deserialize)]
+pub struct Entrance {
+    token: String,
+}
+
+/// `GET /enter?token=…`: lets a browser use a server that listens on a network.
+///
+/// # Errors
+/// A token that was never given out.
+pub async fn enter(State(app): State<AppState>, Query(entrance): Query<Entrance>) -> Result<Response, Problem> {
+    let secret = Secret::brought(entrance.token);
+    match app.store.bearer(&secret).await? {
+        Some(bearer) if bearer.kind == TokenKind::Access => {
+            Ok(([(header::SET_COOKIE, set_cookie(ACCESS_COOKIE, &secret))], Redirect::to("/")).into_response())
+        }
+        _ => Err(Problem::token_needed()),
+    }
+}

@@ -1,0 +1,226 @@
+//! `stair train`: a run with a scripted teacher, in the terminal.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::mpsc::{Sender, channel};
+use std::time::{Duration, Instant};
+
+use anyhow::Context as _;
+use domain::teacher::{Judge, Scripted};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use lab::config::{Layers, RunConfig};
+use lab::message::{Command, Event};
+use lab::run::{Outcome, Run};
+use serde_json::json;
+
+use super::BadInput;
+
+/// Train an agent with a scripted teacher.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  stair train go-fetch-return --preset quick
+  stair train window-open --method pebble --preset quick --labels 500 --seed 3
+  stair train window-open --set feedback.queries_per_session=20 --json
+  stair train --resume data/train/window-open-stair-1")]
+pub struct Args {
+    /// The task; `stair tasks` lists them
+    #[arg(required_unless_present_any = ["resume", "config"])]
+    task: Option<String>,
+    /// The method; `stair tasks` lists them
+    #[arg(long)]
+    method: Option<String>,
+    /// A preset on top of the task's and the method's own: quick
+    #[arg(long)]
+    preset: Vec<String>,
+    /// A TOML file with settings
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// One setting, such as agent.batch=256
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    settings: Vec<String>,
+    /// Of every random stream
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Who answers: oracle, mistaken, coin
+    #[arg(long, default_value = "oracle")]
+    teacher: String,
+    /// Answers in all
+    #[arg(long)]
+    labels: Option<u32>,
+    /// Environment steps in all
+    #[arg(long)]
+    steps: Option<u64>,
+    /// cpu or cuda
+    #[arg(long)]
+    device: Option<String>,
+    /// The run's folder [default: data/train/TASK-METHOD-SEED]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Go on with the run in this folder
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["task", "config", "out", "settings", "preset"])]
+    resume: Option<PathBuf>,
+    /// No progress bar; one JSON object at the end
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Settings that do not fit ([`BadInput`]), a folder that cannot be written, a run that fails.
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let (mut run, folder) = open(&args)?;
+    let judge = judge(&args.teacher, run.config().seed)?;
+    let mut teacher = Scripted::new(judge, run.consumed_sequence());
+    let (sender, commands) = channel();
+    stop_on_interrupt(sender)?;
+    let started = Instant::now();
+    let mut progress = Progress::new(&run, args.json);
+    let outcome = run.drive(&mut teacher, &commands, &mut |event| progress.show(&event))?;
+    progress.bar.finish_and_clear();
+    let config = run.config();
+    match outcome {
+        Outcome::Stopped => eprintln!(
+            "Stopped at step {}. Go on with: stair train --resume {}",
+            run.step(),
+            folder.display()
+        ),
+        Outcome::Finished(finished) if args.json => println!(
+            "{}",
+            json!({
+                "task": config.task, "method": config.method, "seed": config.seed,
+                "env_steps": finished.step, "labels": finished.labels,
+                "success_rate": finished.success_rate, "return_mean": finished.return_mean,
+                "wall_s": started.elapsed().as_secs_f64(), "checkpoint": folder,
+                "weights": finished.weights,
+            })
+        ),
+        Outcome::Finished(finished) => println!(
+            "{} on {}: success {:.2}, return {:.0} after {} steps and {} labels, {:.0} s. Weights {}.\n\
+             Look at it: stair render {} --policy {} --out clip.mp4",
+            config.method,
+            config.task,
+            finished.success_rate,
+            finished.return_mean,
+            finished.step,
+            finished.labels,
+            started.elapsed().as_secs_f64(),
+            finished.weights,
+            config.task,
+            folder.display()
+        ),
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn open(args: &Args) -> anyhow::Result<(Run, PathBuf)> {
+    if let Some(folder) = &args.resume {
+        let (run, complaints) = Run::resume(folder).map_err(BadInput::from_error)?;
+        for complaint in complaints {
+            eprintln!("Passed over a damaged checkpoint. {complaint}");
+        }
+        return Ok((run, folder.clone()));
+    }
+    let config = RunConfig::resolve(&layers(args)?).map_err(BadInput::from_error)?;
+    let named = || format!("data/train/{}-{}-{}", config.task, config.method, config.seed).into();
+    let folder = args.out.clone().unwrap_or_else(named);
+    let run = Run::start(config, &folder).map_err(BadInput::from_error)?;
+    Ok((run, folder))
+}
+
+fn layers(args: &Args) -> anyhow::Result<Layers> {
+    let file = match &args.config {
+        None => None,
+        Some(path) => {
+            let name = path.display().to_string();
+            let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {name}"));
+            Some((name, text.map_err(BadInput::from_error)?))
+        }
+    };
+    let mut overrides = args.settings.clone();
+    overrides.extend(args.seed.map(|seed| format!("seed={seed}")));
+    overrides.extend(args.labels.map(|labels| format!("feedback.budget={labels}")));
+    overrides.extend(args.steps.map(|steps| format!("training.total_steps={steps}")));
+    overrides.extend(args.device.as_ref().map(|device| format!("device={device}")));
+    Ok(Layers { task: args.task.clone(), method: args.method.clone(), presets: args.preset.clone(), file, overrides })
+}
+
+/// The scripted teacher of that name.
+///
+/// # Errors
+/// [`BadInput`] names the nearest right one.
+pub(super) fn judge(name: &str, seed: u64) -> anyhow::Result<Box<dyn Judge>> {
+    domain::teacher::judge(name, seed).ok_or_else(|| {
+        let known: Vec<&str> = domain::teacher::SCRIPTED.iter().map(|(name, _)| *name).collect();
+        let hint = lab::nearest::nearest(name, &known).map(|n| format!(" (did you mean '{n}'?)"));
+        let hint = hint.unwrap_or_default();
+        BadInput(format!("there is no teacher '{name}'{hint}; known: {}", known.join(", "))).into()
+    })
+}
+
+/// The first Ctrl-C leaves a checkpoint.
+fn stop_on_interrupt(sender: Sender<Command>) -> anyhow::Result<()> {
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
+    let runtime = runtime.context("cannot listen for Ctrl-C")?;
+    std::thread::spawn(move || {
+        let heard = runtime.block_on(async {
+            let mut terminate = tokio::signal::unix::signal(tokio::signal::unix::SignalKind::terminate())?;
+            tokio::select! {
+                heard = tokio::signal::ctrl_c() => heard,
+                _ = terminate.recv() => Ok(()),
+            }
+        });
+        if heard.is_ok() {
+            eprintln!("Stopping; a checkpoint is being written.");
+            let _ = sender.send(Command::Stop); // a run that is over needs no telling
+        }
+    });
+    Ok(())
+}
+
+/// A line in the terminal that says where the run is.
+struct Progress {
+    bar: ProgressBar,
+    labels: u32,
+    task_return: f64,
+    success: f64,
+}
+
+impl Progress {
+    fn new(run: &Run, is_quiet: bool) -> Self {
+        let bar = ProgressBar::new(run.config().training.total_steps).with_position(run.step());
+        if is_quiet {
+            bar.set_draw_target(ProgressDrawTarget::hidden());
+        }
+        let style = ProgressStyle::with_template("{bar:30} {pos}/{len} steps  {per_sec}  {msg}  {eta} left");
+        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+        bar.enable_steady_tick(Duration::from_millis(500));
+        bar.reset_eta();
+        Self { bar, labels: 0, task_return: 0.0, success: 0.0 }
+    }
+
+    fn show(&mut self, event: &Event) {
+        match event {
+            Event::Phase(phase) => self.bar.set_position(phase.step),
+            Event::Metrics(row) => {
+                self.labels = row.labels;
+                self.task_return = row.return_mean.unwrap_or(self.task_return);
+                self.bar.set_position(row.step);
+            }
+            Event::Evaluation(evaluation) => {
+                self.success = evaluation.success_rate;
+                self.bar.suspend(|| {
+                    if !self.bar.is_hidden() {
+                        println!(
+                            "step {:>7}  labels {:>5}  success {:.2}  return {:>7.1}",
+                            evaluation.step, evaluation.labels, evaluation.success_rate, evaluation.return_mean
+                        );
+                    }
+                });
+            }
+            _ => {}
+        }
+        let (labels, task_return, success) = (self.labels, self.task_return, self.success);
+        self.bar.set_message(format!("labels {labels}  return {task_return:.0}  success {success:.2}"));
+    }
+}
