@@ -29,8 +29,8 @@ const PUSH: f32 = 40.0;
 const TOP_TURN: f32 = 8.0;
 /// Time constant of the turning rate, seconds.
 const TURN_LAG_S: f32 = 0.05;
-/// Change of the jaws' openness in one control step at full command.
-const JAW_STEP: f32 = 0.08;
+/// Largest change of the jaws' openness in one control step.
+const JAW_STEP: f32 = 0.16;
 
 /// The robot inside a world.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -140,10 +140,11 @@ impl PlanarRobot {
         body.add_torque(Vector::new(0.0, 0.0, torque), true);
     }
 
-    /// Moves the jaws by one control step of `command` (+1 close, −1 open), not beyond
-    /// `narrowest`: 0, or the width of what is between them.
+    /// Moves the jaws for one control step towards where `command` wants them (+1 closed, −1
+    /// open), not beyond `narrowest`: 0, or the width of what is between them.
     pub fn move_jaws(&mut self, command: f32, narrowest: f32) {
-        self.openness = (self.openness - JAW_STEP * command).clamp(narrowest, 1.0);
+        let missing = 0.5 * (1.0 - command) - self.openness;
+        self.openness = (self.openness + missing.clamp(-JAW_STEP, JAW_STEP)).clamp(narrowest, 1.0);
     }
 }
 

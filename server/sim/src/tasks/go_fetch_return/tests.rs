@@ -57,7 +57,7 @@ fn the_expert_succeeds_and_a_random_policy_does_not() {
 }
 
 #[test]
-fn the_expert_passes_through_the_stages_in_order_and_spends_a_segment_in_each() {
+fn the_expert_passes_through_the_stages_in_order_and_lingers_in_each() {
     let mut mean_steps = [0.0; STAGES.len()];
     for seed in 0..100 {
         let stages = play(seed, &mut expert).stages;
@@ -66,7 +66,7 @@ fn the_expert_passes_through_the_stages_in_order_and_spends_a_segment_in_each() 
             mean_steps[usize::from(stage)] += 0.01;
         }
     }
-    assert!(mean_steps.iter().all(|&n| n >= 12.0), "{mean_steps:?}");
+    assert!(mean_steps.iter().all(|&n| n >= 10.0), "{mean_steps:?}");
 }
 
 #[test]
@@ -108,8 +108,8 @@ fn no_state_before_a_stage_pays_as_much_as_the_worst_one_after_it() {
 fn the_reward_agrees_with_values_worked_out_by_hand() {
     let reward = |v: View| v.task_reward().0;
     // near(1) = 0.6 · (1 − 1/3.4) + 0.4 · e⁻⁵ = 0.423529 + 0.002695
-    assert!((reward(view(1.1, 1.0, false, 1.0)) - 3.0 * 0.426_225).abs() < 1e-5);
-    assert!((reward(view(1.1, 0.5, false, 1.0)) - 2.4 * 0.426_225).abs() < 1e-5);
+    assert!((reward(view(JAW_ZONE + 1.0, 1.0, false, 1.0)) - 3.0 * 0.426_225).abs() < 1e-5);
+    assert!((reward(view(JAW_ZONE + 1.0, 0.5, false, 1.0)) - 2.4 * 0.426_225).abs() < 1e-5);
     assert!(
         (reward(view(0.0, 0.45, true, 1.0 + GOAL_RADIUS)) - (5.0 + 5.0 * 0.426_225)).abs() < 1e-5
     );
