@@ -17,8 +17,8 @@
 //! everything at rest, jaws open.
 //!
 //! # Taking and dropping
-//! o is the jaws' openness: 1 open, 0.45 around the object, 0 closed on nothing; a full command
-//! moves it by 0.16 a step. The object is **between the jaws** when ‖b − j‖ ≤ 0.14 and o ≥ 0.45:
+//! o is the jaws' openness: 1 open, 0.45 around the object, 0 closed on nothing; it follows the
+//! command by up to 0.16 a step. The object is **between the jaws** when ‖b − j‖ ≤ 0.14 and o ≥ 0.45:
 //! jaws that came closed must open first. Closing to 0.45 with the object between them **takes**
 //! it: from then on it is lifted and drawn to j. Opening to 0.6 **drops** it where it is; it is
 //! also lost when something holds it back by more than 0.2.
@@ -39,7 +39,7 @@
 //! | index | content |
 //! |---|---|
 //! | 0–1 | wanted velocity in world axes; 1 is 0.6 m/s; cut to the unit disc |
-//! | 2 | jaws: +1 close, −1 open, 0 leave them |
+//! | 2 | a: wanted openness of the jaws, (1 − a)/2; +1 closed, −1 open |
 //!
 //! # Reward
 //! In [0, 10], with near(x) = 0.6 · (1 − x/3.4) + 0.4 · exp(−x/0.2), not below 0:
