@@ -59,6 +59,7 @@ function proceed() {
   interrupted = null;
   if (next) show(next, null);
   else {
+    pressedAt = 0;
     setStage('waiting');
     refill();
   }
@@ -223,7 +224,7 @@ function tellWaiting(state) {
   const until = state.until ? ` Until ${timeOfDay(state.until).slice(0, 5)}.` : '';
   setText('waiting-text', `${state.message ?? ''}${until}`);
   const progress = state.phase?.progress;
-  const hasProgress = typeof progress === 'number' && (state.kind === 'waiting' || state.kind === 'drawing');
+  const hasProgress = typeof progress === 'number' && state.kind === 'waiting';
   $('waiting-bar').hidden = !hasProgress;
   if (hasProgress) $('waiting-bar').value = progress;
   $('to-run').hidden = !['done', 'failed', 'paused'].includes(state.kind);

@@ -7,7 +7,7 @@ const page = document.getElementById('run');
 const run = page.dataset.run;
 const $ = (id) => document.getElementById(id);
 const percent = (value) => `${Math.round(value * 100)} %`;
-const fixed = (value) => value.toFixed(2);
+const fixed = (value) => (Math.abs(value) < 10 ? value.toFixed(2) : compact(value));
 
 /** What each panel of the page shows; `id` is its <figure>. */
 const PANELS = [

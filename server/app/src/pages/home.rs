@@ -194,7 +194,7 @@ fn card(task: &'static sim::tasks::Task) -> TaskCard {
 
 /// A drawn picture where there is one, a sketch otherwise.
 fn picture(task: &str) -> String {
-    let names = ["png", "svg"].map(|kind| format!("cards/{task}.{kind}"));
+    let names = ["webp", "svg"].map(|kind| format!("cards/{task}.{kind}"));
     let found = names.into_iter().find(|name| assets::contains(name));
     format!("/static/{}", found.as_deref().unwrap_or("cards/any.svg"))
 }
