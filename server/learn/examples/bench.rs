@@ -5,7 +5,10 @@
 //! thread, the least of interleaved rounds, so that other work on the machine disturbs little.
 //! The floor is the row's matrix products at the rate of a 1024³ f32 product in the same round.
 
-use std::time::Duration;
+#![expect(
+    clippy::cast_possible_wrap,
+    reason = "sizes of tensors and floating-point counts"
+)]
 
 use domain::answer::{Preference, Which};
 use domain::environment::{EpisodeEnd, TaskReward};
@@ -30,7 +33,8 @@ struct Row {
     /// How often it runs in a round.
     n_repeats: u32,
     work: Box<dyn FnMut()>,
-    least: Duration,
+    /// Seconds of one run in the fastest round.
+    least: f64,
 }
 
 fn main() {
@@ -50,7 +54,8 @@ fn main() {
         for row in &mut rows {
             let before = cpu_time();
             (0..row.n_repeats).for_each(|_| (row.work)());
-            row.least = row.least.min((cpu_time() - before) / row.n_repeats);
+            let seconds = (cpu_time() - before) / f64::from(row.n_repeats);
+            row.least = row.least.min(seconds);
         }
     }
     let rate = 2.0 * 1.024_f64.powi(3) / fastest_product; // GF/s
@@ -60,7 +65,7 @@ fn main() {
     );
     println!("| what | CPU ms | floor ms | share |\n|---|---|---|---|");
     for row in rows {
-        let (ms, floor) = (row.least.as_secs_f64() * 1e3, row.gigaflop / rate * 1e3);
+        let (ms, floor) = (row.least * 1e3, row.gigaflop / rate * 1e3);
         let (floor, share) = if row.gigaflop > 0.0 {
             (format!("{floor:.1}"), format!("{:.2}", floor / ms))
         } else {
@@ -136,7 +141,7 @@ fn row(name: &'static str, gigaflop: f64, n_repeats: u32, work: impl FnMut() + '
         gigaflop,
         n_repeats,
         work: Box::new(work),
-        least: Duration::MAX,
+        least: f64::INFINITY,
     }
 }
 
@@ -369,18 +374,18 @@ fn product_of_1024() -> impl FnMut() -> f64 {
         let time = |_| {
             let before = cpu_time();
             let _ = a.matmul_out(&c, &b);
-            (cpu_time() - before).as_secs_f64()
+            cpu_time() - before
         };
         (0..10).map(time).fold(f64::INFINITY, f64::min)
     }
 }
 
-/// CPU time that this thread has used.
+/// Seconds of CPU time that this thread has used.
 #[expect(
     unsafe_code,
     reason = "the thread's own clock is read through a C function"
 )]
-fn cpu_time() -> Duration {
+fn cpu_time() -> f64 {
     const CLOCK_THREAD_CPUTIME_ID: i32 = 3;
     unsafe extern "C" {
         fn clock_gettime(clock: i32, time: *mut [i64; 2]) -> i32;
@@ -389,5 +394,5 @@ fn cpu_time() -> Duration {
     // SAFETY: on 64-bit Linux a timespec is two 64-bit numbers, which it fills.
     let failed = unsafe { clock_gettime(CLOCK_THREAD_CPUTIME_ID, &raw mut time) };
     assert_eq!(failed, 0, "the thread's clock can be read");
-    Duration::new(time[0] as u64, time[1] as u32)
+    time[0] as f64 + 1e-9 * time[1] as f64
 }

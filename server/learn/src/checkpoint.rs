@@ -151,24 +151,8 @@ impl Archive {
         let mut data = Vec::new();
         for (name, section) in &self.sections {
             let start = data.len();
-            let entry: Box<dyn Fn(usize) -> Entry> = match section {
-                Section::F32 { shape, values } => {
-                    data.extend(values.iter().flat_map(|v| v.to_le_bytes()));
-                    Box::new(|n_bytes| Entry::F32 {
-                        shape: shape.clone(),
-                        n_bytes,
-                    })
-                }
-                Section::F64(values) => {
-                    data.extend(values.iter().flat_map(|v| v.to_le_bytes()));
-                    Box::new(|n_bytes| Entry::F64 { n_bytes })
-                }
-                Section::Json(json) => {
-                    data.extend(json.as_bytes());
-                    Box::new(|n_bytes| Entry::Json { n_bytes })
-                }
-            };
-            contents.insert(name, entry(data.len() - start));
+            section.append_to(&mut data);
+            contents.insert(name, section.entry(data.len() - start));
         }
         let contents = serde_json::to_vec(&contents).expect("a table of contents is plain JSON");
         let mut bytes = Vec::with_capacity(HEAD_LEN + contents.len() + data.len() + TAIL_LEN);
@@ -229,6 +213,25 @@ impl Archive {
 }
 
 impl Section {
+    fn append_to(&self, data: &mut Vec<u8>) {
+        match self {
+            Self::F32 { values, .. } => data.extend(values.iter().flat_map(|v| v.to_le_bytes())),
+            Self::F64(values) => data.extend(values.iter().flat_map(|v| v.to_le_bytes())),
+            Self::Json(json) => data.extend(json.as_bytes()),
+        }
+    }
+
+    fn entry(&self, n_bytes: usize) -> Entry {
+        match self {
+            Self::F32 { shape, .. } => Entry::F32 {
+                shape: shape.clone(),
+                n_bytes,
+            },
+            Self::F64(_) => Entry::F64 { n_bytes },
+            Self::Json(_) => Entry::Json { n_bytes },
+        }
+    }
+
     fn parse(entry: Entry, bytes: &[u8]) -> Result<Self, String> {
         Ok(match entry {
             Entry::F32 { shape, .. } => Self::F32 {
@@ -295,10 +298,8 @@ mod tests {
         archive.write(&path).expect("written");
         let read = Archive::read(&path).expect("read");
         assert_eq!(read.fingerprint(), archive.fingerprint());
-        assert_eq!(
-            read.f32("weights", &[2, 2]).expect("there")[2],
-            f32::MIN_POSITIVE
-        );
+        let weights = read.f32("weights", &[2, 2]).expect("there");
+        assert_eq!(weights[2].to_bits(), f32::MIN_POSITIVE.to_bits());
         assert_eq!(
             read.f64::<2>("moments").expect("there")[0].to_bits(),
             (0.1_f64 + 0.2).to_bits()

@@ -24,7 +24,7 @@ impl Checksum {
     }
 
     pub(crate) fn update(&mut self, mut bytes: &[u8]) {
-        while self.n_bytes % 8 != 0 && !bytes.is_empty() {
+        while !self.n_bytes.is_multiple_of(8) && !bytes.is_empty() {
             self.push(bytes[0]);
             bytes = &bytes[1..];
         }

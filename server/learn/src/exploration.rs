@@ -139,7 +139,7 @@ fn neighbour_distances<'a>(
     if !chunk.is_empty() {
         compare(&chunk);
     }
-    nearest.iter().map(|n| n.last_distance()).collect()
+    nearest.iter().map(Nearest::last_distance).collect()
 }
 
 /// The smallest keys of one query so far, ascending, with their true squared distances.
@@ -315,7 +315,9 @@ mod tests {
             for step in 0..n {
                 let mut values = vec![0.0; 512];
                 Rng::new(1, Stream::Test, step).fill_normal(&mut values);
-                values.iter_mut().for_each(|v| *v *= 0.1);
+                for value in &mut values {
+                    *value *= 0.1;
+                }
                 running.update(&values, has_slip);
             }
             running.variance.sqrt()

@@ -4,7 +4,7 @@
 //! (which the compiler turns into vector instructions), tensor operations for other devices.
 //! Shapes: `E` members, `B` rows, `N` columns; all tensors contiguous.
 
-use std::ops::{Add, AddAssign, Div, Mul, Sub};
+use std::ops::{Add, AddAssign, Div, Mul, MulAssign, Sub, SubAssign};
 
 use tch::{Device, Kind, Tensor};
 
@@ -17,6 +17,8 @@ pub(crate) trait Real:
     + Copy
     + PartialOrd
     + AddAssign
+    + SubAssign
+    + MulAssign
     + Add<Output = Self>
     + Sub<Output = Self>
     + Mul<Output = Self>
@@ -108,12 +110,11 @@ pub(crate) fn bias_activate_backward(
             let (n_columns, member) = (columns(gradient), member_len(gradient));
             let slope = T::of(slope);
             let mut unused = Vec::new();
-            let sums = match bias_gradient {
-                Some(sums) => values_mut::<T>(sums),
-                None => {
-                    unused.resize(gradient.numel() / member * n_columns, T::of(0.0));
-                    &mut unused[..]
-                }
+            let sums = if let Some(sums) = bias_gradient {
+                values_mut::<T>(sums)
+            } else {
+                unused.resize(gradient.numel() / member * n_columns, T::of(0.0));
+                &mut unused[..]
             };
             let members = values_mut::<T>(gradient).chunks_exact_mut(member);
             let members = members.zip(values::<T>(output).chunks_exact(member));
@@ -162,14 +163,16 @@ pub(crate) fn norm_activate(
                 let (bias, gain, shift) =
                     (&bias[at..at + n_columns], &gain[at..at + n_columns], &shift[at..at + n_columns]);
                 for (z, b) in z.iter_mut().zip(bias) {
-                    *z = *z + *b;
+                    *z += *b;
                 }
                 let mean = sum(z) / n;
-                z.iter_mut().for_each(|z| *z = *z - mean);
+                for z in &mut *z {
+                    *z -= mean;
+                }
                 let variance = dot(z, z) / n;
                 *inverse = T::of(1.0) / (variance + T::of(NORM_EPSILON)).sqrt();
                 for (((z, y), g), s) in z.iter_mut().zip(y).zip(gain).zip(shift) {
-                    *z = *z * *inverse;
+                    *z *= *inverse;
                     let value = *z * *g + *s;
                     *y = if value > T::of(0.0) { value } else { slope * value };
                 }
@@ -222,17 +225,14 @@ pub(crate) fn norm_activate_backward(
             let (n_columns, member) = (columns(gradient), member_len(gradient));
             let (slope, n) = (T::of(slope), T::of(n_columns as f64));
             let mut unused = Vec::new();
-            let (bias, gains, shifts) = match into {
-                Some(NormGradient { bias, gain, shift }) => {
-                    (values_mut::<T>(bias), values_mut::<T>(gain), values_mut::<T>(shift))
-                }
-                None => {
-                    let len = gradient.numel() / member * n_columns;
-                    unused.resize(3 * len, T::of(0.0));
-                    let (bias, rest) = unused.split_at_mut(len);
-                    let (gains, shifts) = rest.split_at_mut(len);
-                    (bias, gains, shifts)
-                }
+            let (bias, gains, shifts) = if let Some(NormGradient { bias, gain, shift }) = into {
+                (values_mut::<T>(bias), values_mut::<T>(gain), values_mut::<T>(shift))
+            } else {
+                let len = gradient.numel() / member * n_columns;
+                unused.resize(3 * len, T::of(0.0));
+                let (bias, rest) = unused.split_at_mut(len);
+                let (gains, shifts) = rest.split_at_mut(len);
+                (bias, gains, shifts)
             };
             let (outputs, normalised) = (values::<T>(forward.output), values::<T>(forward.normalised));
             let (inverses, gain) = (values::<T>(forward.inverse), values::<T>(forward.gain));
@@ -309,7 +309,7 @@ pub(crate) fn adam(
                 let g = scale * *g;
                 *m = d1 * *m + c1 * g;
                 *v = d2 * *v + c2 * g * g;
-                *p = *p - rate * *m / (v.sqrt() * root + epsilon);
+                *p -= rate * *m / (v.sqrt() * root + epsilon);
             }
         },
         {

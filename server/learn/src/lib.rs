@@ -5,6 +5,11 @@
 //! thread per learner; a task reward reaches a learner only through
 //! [`replay::RewardSource::Task`], the upper bound's own road.
 
+#![expect(
+    clippy::cast_possible_wrap,
+    reason = "libtorch counts in i64, Rust in usize; nothing here comes near 2⁶³"
+)]
+
 pub mod beliefs;
 pub mod checkpoint;
 pub mod device;

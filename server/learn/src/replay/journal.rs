@@ -204,7 +204,7 @@ impl Replay {
         } = self.shape;
         if tag == BEGIN {
             let seed = u64::from_le_bytes(reader.take()?);
-            let stage = reader.stage()?;
+            let stage = stage(reader.u8()?);
             let (observation, pose) = (reader.f32s(observation)?, reader.f32s(pose)?);
             self.begin_episode(lane, seed, &observation, &pose, stage);
             return Some(());
@@ -212,7 +212,7 @@ impl Replay {
         let mark = StepMark(reader.u8()?);
         let task_reward = TaskReward(f64::from_le_bytes(reader.take()?));
         let action = reader.f32s(action)?;
-        let stage = reader.stage()?;
+        let stage = stage(reader.u8()?);
         let (next_observation, next_pose) = (reader.f32s(observation)?, reader.f32s(pose)?);
         if tag != PUSH || self.lanes[lane].running.is_none() {
             return None;
@@ -280,15 +280,16 @@ impl Reader<'_> {
         self.take::<1>().map(|[byte]| byte)
     }
 
-    fn stage(&mut self) -> Option<Option<u8>> {
-        self.u8().map(|stage| (stage != NO_STAGE).then_some(stage))
-    }
-
     fn f32s(&mut self, n: usize) -> Option<Vec<f32>> {
         let (own, rest) = self.0.split_at_checked(4 * n)?;
         self.0 = rest;
         Some(numbers(own, f32::from_le_bytes))
     }
+}
+
+/// A state's stage from its byte.
+fn stage(byte: u8) -> Option<u8> {
+    (byte != NO_STAGE).then_some(byte)
 }
 
 fn put(bytes: &mut Vec<u8>, values: &[f32]) {

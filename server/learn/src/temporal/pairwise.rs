@@ -108,7 +108,7 @@ impl Pairwise {
             {
                 if let Some(coordinate) = which.index() {
                     x_slopes[coordinate] += *slope;
-                    y_slopes[coordinate] = y_slopes[coordinate] - *slope;
+                    y_slopes[coordinate] -= *slope;
                 }
             }
         }
@@ -155,7 +155,9 @@ fn forward<T: Real>(x: &Tensor, y: &Tensor, outputs: (&mut Tensor, &mut Tensor, 
                 *apart += difference * difference;
             }
         }
-        apart.iter_mut().for_each(|square| *square = square.sqrt());
+        for square in apart {
+            *square = square.sqrt();
+        }
     }
 }
 
