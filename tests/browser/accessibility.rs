@@ -4,8 +4,7 @@
 use serde_json::json;
 
 use super::driver::{Browser, Scheme};
-use super::labeler::{answer, run_for_people, sit_down};
-use crate::stories::server_process::ServerProcess;
+use super::labeler::{Desk, answer};
 
 /// axe-core, unchanged; its version, hash and licence lie beside it.
 const AXE: &str = include_str!("vendor/axe.min.js");
@@ -21,20 +20,24 @@ async fn axe_finds_nothing_in_dark_on_a_small_phone() {
 }
 
 async fn look_at_every_page(scheme: Scheme, size: (u32, u32)) {
-    let Some(browser) = Browser::open(scheme, size).await else { return };
-    let data = tempfile::tempdir().expect("a temporary folder");
-    let server = ServerProcess::start(data.path());
-    let root = format!("http://{}", server.address);
-    let run = run_for_people(&server, 0.0);
+    let Some(browser) = Browser::open(scheme, size).await else {
+        return;
+    };
+    let desk = Desk::set_up(4).await;
 
-    browser.goto(&root).await;
-    browser.run("document.querySelectorAll('details').forEach((part) => { part.open = true; })", vec![]).await;
+    browser.goto(&desk.page("/")).await;
+    browser
+        .run(
+            "document.querySelectorAll('details').forEach((part) => { part.open = true; })",
+            vec![],
+        )
+        .await;
     look("home", &browser).await;
-    browser.goto(&format!("{root}/runs/no-such-run")).await;
+    browser.goto(&desk.page("/runs/no-such-run")).await;
     look("problem", &browser).await;
-    browser.goto(&format!("{root}/runs/{run}/label")).await;
+    browser.goto(&desk.label_page()).await;
     look("name", &browser).await;
-    sit_down(&browser, &server, &run).await;
+    desk.sit_down(&browser).await;
     look("label", &browser).await;
     browser.press("?").await;
     look("guidance", &browser).await;
@@ -43,12 +46,18 @@ async fn look_at_every_page(scheme: Scheme, size: (u32, u32)) {
     look("reasons", &browser).await;
     browser.press("\u{E00C}").await;
     answer(&browser, "1").await;
-    browser.goto(&format!("{root}/runs/{run}")).await;
+    browser
+        .goto(&desk.page(&format!("/runs/{}", desk.run)))
+        .await;
     look("run", &browser).await;
 }
 
 async fn look(page: &str, browser: &Browser) {
-    browser.client.execute(AXE, vec![]).await.expect("axe is there");
+    browser
+        .client
+        .execute(AXE, vec![])
+        .await
+        .expect("axe is there");
     let violations = browser
         .run(
             "const found = await axe.run(document, { runOnly: ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa'] });
@@ -66,6 +75,11 @@ async fn look(page: &str, browser: &Browser) {
         )
         .await;
     assert_eq!(small, json!([]), "smaller than a finger on {page}");
-    let too_wide = browser.value("document.documentElement.scrollWidth - innerWidth").await;
-    assert!(too_wide.as_i64().is_some_and(|by| by <= 0), "{page} is too wide by {too_wide}");
+    let too_wide = browser
+        .value("document.documentElement.scrollWidth - innerWidth")
+        .await;
+    assert!(
+        too_wide.as_i64().is_some_and(|by| by <= 0),
+        "{page} is too wide by {too_wide}"
+    );
 }

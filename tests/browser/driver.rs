@@ -12,14 +12,14 @@ use serde_json::{Value, json};
 
 /// What the browser's owner asked their system for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Scheme {
+pub(crate) enum Scheme {
     Light,
     Dark,
 }
 
 /// One browser window; closing is dropping.
-pub struct Browser {
-    pub client: Client,
+pub(crate) struct Browser {
+    pub(crate) client: Client,
     driver: Child,
     _profile: tempfile::TempDir,
 }
@@ -27,10 +27,11 @@ pub struct Browser {
 impl Browser {
     /// Opens a window, or says loudly why the story is skipped. Where CI is set, a missing browser
     /// is a failure.
-    pub async fn open(scheme: Scheme, size: (u32, u32)) -> Option<Self> {
+    pub(crate) async fn open(scheme: Scheme, size: (u32, u32)) -> Option<Self> {
         let programs = (found("chromium"), found("chromedriver"));
         let (Some(chromium), Some(chromedriver)) = programs else {
-            let how = "chromium or chromedriver is missing: apt-get install -y chromium chromium-driver";
+            let how =
+                "chromium or chromedriver is missing: apt-get install -y chromium chromium-driver";
             assert!(std::env::var_os("CI").is_none(), "{how}");
             eprintln!("SKIPPED, this story was NOT tested: {how}");
             return None;
@@ -48,45 +49,68 @@ impl Browser {
             .connect(&format!("http://127.0.0.1:{port}"))
             .await
             .expect("chromedriver opens a window");
-        Some(Self { client, driver, _profile: profile })
+        Some(Self {
+            client,
+            driver,
+            _profile: profile,
+        })
     }
 
     /// Goes to an address.
-    pub async fn goto(&self, url: &str) {
+    pub(crate) async fn goto(&self, url: &str) {
         self.client.goto(url).await.expect("the page loads");
     }
 
     /// Presses one key, as a person does.
-    pub async fn press(&self, key: &str) {
-        let body = self.client.active_element().await.expect("something has the focus");
+    pub(crate) async fn press(&self, key: &str) {
+        let body = self
+            .client
+            .active_element()
+            .await
+            .expect("something has the focus");
         body.send_keys(key).await.expect("the key is pressed");
     }
 
     /// Value of a JavaScript expression.
-    pub async fn value(&self, expression: &str) -> Value {
+    pub(crate) async fn value(&self, expression: &str) -> Value {
         let script = format!("return ({expression});");
-        self.client.execute(&script, vec![]).await.expect("the expression has a value")
+        self.client
+            .execute(&script, vec![])
+            .await
+            .expect("the expression has a value")
     }
 
     /// Runs statements of an async function and gives what they return.
-    pub async fn run(&self, statements: &str, arguments: Vec<Value>) -> Value {
+    pub(crate) async fn run(&self, statements: &str, arguments: Vec<Value>) -> Value {
         let script = format!(
             "const done = arguments[arguments.length - 1]; const given = [...arguments].slice(0, -1);
              (async (...given) => {{ {statements} }})(...given).then((value) => done({{ value }}), (reason) => done({{ reason: String(reason) }}));"
         );
-        let outcome = self.client.execute_async(&script, arguments).await.expect("the script runs");
-        assert!(outcome.get("reason").is_none(), "in the page: {}", outcome["reason"]);
+        let outcome = self
+            .client
+            .execute_async(&script, arguments)
+            .await
+            .expect("the script runs");
+        assert!(
+            outcome.get("reason").is_none(),
+            "in the page: {}",
+            outcome["reason"]
+        );
         outcome["value"].clone()
     }
 
     /// Text of the first element that a CSS selector finds.
-    pub async fn text(&self, selector: &str) -> String {
+    pub(crate) async fn text(&self, selector: &str) -> String {
         let element = self.client.find(Locator::Css(selector)).await;
-        element.unwrap_or_else(|e| panic!("{selector}: {e}")).text().await.expect("it has text")
+        element
+            .unwrap_or_else(|e| panic!("{selector}: {e}"))
+            .text()
+            .await
+            .expect("it has text")
     }
 
     /// Waits until an expression is true; fails with the page's words when it never becomes so.
-    pub async fn until(&self, expression: &str) {
+    pub(crate) async fn until(&self, expression: &str) {
         let script = format!(
             "const end = performance.now() + 60000;
              while (performance.now() < end) {{
@@ -96,7 +120,10 @@ impl Browser {
              return document.body.innerText.slice(0, 600);"
         );
         let outcome = self.run(&script, vec![]).await;
-        assert!(outcome == json!(true), "never came true: {expression}; the page says: {outcome}");
+        assert!(
+            outcome == json!(true),
+            "never came true: {expression}; the page says: {outcome}"
+        );
     }
 }
 
@@ -110,21 +137,34 @@ impl Drop for Browser {
 
 fn found(program: &str) -> Option<PathBuf> {
     let folders = std::env::var_os("PATH")?;
-    std::env::split_paths(&folders).map(|folder| folder.join(program)).find(|path| path.is_file())
+    std::env::split_paths(&folders)
+        .map(|folder| folder.join(program))
+        .find(|path| path.is_file())
 }
 
 fn port_of(driver: &mut Child) -> u16 {
     let output = driver.stdout.take().expect("its output is a pipe");
     let mut lines = BufReader::new(output).lines().map_while(Result::ok);
     let port = lines
-        .find_map(|line| line.split("on port ").nth(1)?.trim_end_matches('.').parse().ok())
+        .find_map(|line| {
+            line.split("on port ")
+                .nth(1)?
+                .trim_end_matches('.')
+                .parse()
+                .ok()
+        })
         .expect("chromedriver names its port");
     // Nobody reads on; a full pipe would block it.
     std::thread::spawn(move || lines.for_each(drop));
     port
 }
 
-fn capabilities(chromium: &std::path::Path, profile: &std::path::Path, scheme: Scheme, size: (u32, u32)) -> Capabilities {
+fn capabilities(
+    chromium: &std::path::Path,
+    profile: &std::path::Path,
+    scheme: Scheme,
+    size: (u32, u32),
+) -> Capabilities {
     let preferred = if scheme == Scheme::Dark { 0 } else { 1 };
     let arguments = [
         "--headless",
@@ -142,5 +182,10 @@ fn capabilities(chromium: &std::path::Path, profile: &std::path::Path, scheme: S
     .map(str::to_owned);
     let options = json!({ "binary": chromium, "args": arguments });
     let timeouts = json!({ "script": Duration::from_secs(120).as_millis() as u64 });
-    [("goog:chromeOptions".to_owned(), options), ("timeouts".to_owned(), timeouts)].into_iter().collect()
+    [
+        ("goog:chromeOptions".to_owned(), options),
+        ("timeouts".to_owned(), timeouts),
+    ]
+    .into_iter()
+    .collect()
 }

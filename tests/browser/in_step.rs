@@ -5,17 +5,10 @@ use std::collections::BTreeSet;
 use serde_json::{Value, json};
 
 use super::driver::{Browser, Scheme};
-use super::labeler::{run_for_people, sit_down};
-use crate::stories::server_process::ServerProcess;
+use super::labeler::{Desk, N_FRAMES};
 
-const N_FRAMES: u16 = 50;
-
-/// Puts two bar-code clips on the page's player. `read` gives the number that a canvas shows.
+/// `read` gives the number that a canvas shows.
 const SET_UP: &str = "
-    const { loadClip } = await import('/static/clip.js');
-    const send = window.fetch;
-    window.fetch = (url, how) => url === '/bar-codes.mp4' ? Promise.resolve(new Response(new Uint8Array(given[0]))) : send(url, how);
-    const clips = await Promise.all([0, 1].map(() => loadClip('/bar-codes.mp4')));
     window.player = document.getElementById('pair');
     window.read = (side) => {
       const canvas = player.querySelector(`canvas[data-side=${side}]`);
@@ -24,8 +17,7 @@ const SET_UP: &str = "
       for (let k = 2; k < 18; k += 1) n = n * 2 + (data[4 * ((2 * k + 1) * width / 40 | 0) + 1] > 127 ? 1 : 0);
       return n;
     };
-    player.show(...clips);
-    return clips.map((clip) => clip.frames.length);";
+    return Number(player.querySelector('[data-do=scrub]').max) + 1;";
 
 /// Looks at both canvases on every frame of the screen for some seconds.
 const WATCH: &str = "
@@ -57,22 +49,27 @@ const SEEK: &str = "
 
 #[tokio::test(flavor = "multi_thread")]
 async fn both_clips_are_never_more_than_one_frame_apart() {
-    let Some(browser) = Browser::open(Scheme::Light, (1280, 900)).await else { return };
-    let data = tempfile::tempdir().expect("a temporary folder");
-    let server = ServerProcess::start(data.path());
-    let run = run_for_people(&server, 0.0);
-    sit_down(&browser, &server, &run).await;
-    let pictures: Vec<_> = (0..N_FRAMES).map(|n| render::bar_code::frame(n, (480, 360))).collect();
-    let clip = render::clip::encode(&pictures, 25).expect("a clip");
-    let counts = browser.run(SET_UP, vec![json!(clip.bytes)]).await;
-    assert_eq!(counts, json!([N_FRAMES, N_FRAMES]), "every frame is decoded");
+    let Some(browser) = Browser::open(Scheme::Light, (1280, 900)).await else {
+        return;
+    };
+    let desk = Desk::set_up(1).await;
+    desk.sit_down(&browser).await;
+    assert_eq!(
+        browser.run(SET_UP, vec![]).await,
+        json!(N_FRAMES),
+        "every frame is decoded"
+    );
 
     for (speed, seconds) in [(0.25, 10), (1.0, 10), (4.0, 10)] {
         let seen = browser.run(WATCH, vec![json!(speed), json!(seconds)]).await;
         let seen: Vec<(u64, u64)> = seen.as_array().expect("a list").iter().map(pair).collect();
         let apart = seen.iter().map(|(left, right)| left.abs_diff(*right)).max();
         let frames: BTreeSet<u64> = seen.iter().map(|(left, _)| *left).collect();
-        println!("{speed}×: {} looks in {seconds} s, {} different frames, at most {apart:?} apart", seen.len(), frames.len());
+        println!(
+            "{speed}×: {} looks in {seconds} s, {} different frames, at most {apart:?} apart",
+            seen.len(),
+            frames.len()
+        );
         assert!(apart.is_some_and(|frames| frames <= 1), "{seen:?}");
         assert!(frames.len() > 5, "it plays: {frames:?}");
     }
@@ -81,5 +78,8 @@ async fn both_clips_are_never_more_than_one_frame_apart() {
 }
 
 fn pair(value: &Value) -> (u64, u64) {
-    (value[0].as_u64().expect("a number"), value[1].as_u64().expect("a number"))
+    (
+        value[0].as_u64().expect("a number"),
+        value[1].as_u64().expect("a number"),
+    )
 }

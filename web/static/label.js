@@ -76,6 +76,7 @@ function show(pair, before) {
   if (isChanging) $('before').textContent = WORDS[before] ?? before;
   $('undo').disabled = undoable() === null;
   shownAt = Infinity;
+  page.dataset.shown = '';
   setStage('working');
   player.show(pair.left, pair.right);
 }
