@@ -212,3 +212,95 @@ async fn check_settings(connection: &mut SqliteConnection) -> Result<(), StoreEr
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use sqlx::{Connection as _, Executor as _, SqliteConnection};
+
+    use super::*;
+
+    /// SQL from outside the program, as somebody with a database shell would send it.
+    async fn execute(folder: &Path, sql: &'static str) -> Result<(), sqlx::Error> {
+        let options = SqliteConnectOptions::new().filename(folder.join("stair.sqlite"));
+        let mut shell = SqliteConnection::connect_with(&options).await?;
+        shell.execute(sql).await?;
+        shell.close().await
+    }
+
+    #[tokio::test]
+    async fn a_database_from_a_newer_version_is_refused_and_left_alone() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        drop(Store::open(folder.path()).await.expect("a store"));
+        let later =
+            "insert into _sqlx_migrations (version, description, success, checksum, execution_time)
+                     values (9999, 'later', 1, x'00', 0)";
+        execute(folder.path(), later)
+            .await
+            .expect("a newer program was here");
+        let refused = Store::open(folder.path())
+            .await
+            .expect_err("must be refused");
+        assert!(
+            matches!(refused, StoreError::Newer { version: 9999, .. }),
+            "{refused}"
+        );
+    }
+
+    #[tokio::test]
+    async fn a_second_store_is_told_who_holds_the_folder() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let first = Store::open(folder.path()).await.expect("a store");
+        let refused = Store::open(folder.path())
+            .await
+            .expect_err("must be refused");
+        assert!(
+            refused
+                .to_string()
+                .contains(&format!("process {}", std::process::id())),
+            "{refused}"
+        );
+        drop(first);
+    }
+
+    #[tokio::test]
+    async fn audit_rows_cannot_be_changed_or_removed() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let store = Store::open(folder.path()).await.expect("a store");
+        let run = crate::run::NewRun {
+            task: "any".into(),
+            method: "any".into(),
+            preset: String::new(),
+            seed: 1,
+            teacher: "human".into(),
+            draws_clips: true,
+            config: String::new(),
+            budget: 1,
+            total_steps: 1,
+            is_trained: false,
+        };
+        let id = store.add_run(run).await.expect("a run");
+        let refused = store
+            .set_run_state(id, "asleep", "", "")
+            .await
+            .expect_err("no such state");
+        assert!(
+            matches!(&refused, StoreError::Rule(rule) if rule.contains("run_state_known")),
+            "{refused}"
+        );
+        for sql in ["delete from audit", "update audit set action = 'nothing'"] {
+            let refused = execute(folder.path(), sql).await.expect_err(sql);
+            assert!(refused.to_string().contains("append-only"), "{refused}");
+        }
+    }
+
+    #[tokio::test]
+    async fn one_that_fails_takes_nothing_else_with_it() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let store = Store::open(folder.path()).await.expect("a store");
+        let (good, bad) = tokio::join!(store.sign_in("Ada"), store.sign_in(" "));
+        assert_eq!(good.expect("Ada").0.name, "Ada");
+        assert!(
+            matches!(bad, Err(StoreError::Rule(rule)) if rule.contains("labeler_name_not_empty"))
+        );
+    }
+}
