@@ -17,7 +17,7 @@ pub const RADIUS: f32 = 0.16;
 /// From the robot's centre to the point between its jaws, metres.
 pub const REACH: f32 = 0.25;
 /// Fastest drive, metres per second.
-pub const TOP_SPEED: f32 = 0.6;
+pub const TOP_SPEED: f32 = 1.0;
 
 /// Kilograms.
 const MASS: f32 = 4.0;

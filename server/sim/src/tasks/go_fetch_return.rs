@@ -5,7 +5,7 @@
 //!
 //! # Geometry
 //! A floor of [−1.2, 1.2]² inside low walls. The robot is a disc of radius 0.16 that drives in
-//! any direction at up to 0.6 m/s (lag 0.1 s) and turns its nose to where it is told to go; its
+//! any direction at up to 1 m/s (lag 0.1 s) and turns its nose to where it is told to go; its
 //! body pushes what it touches. p is its centre, n its nose (a unit vector) and
 //! **j = p + 0.25 n** the point between its jaws. The object, a disc of radius 0.075, is at b; it
 //! slides and comes to rest by itself. The goal, at g, is a mark on the floor of radius
@@ -13,7 +13,7 @@
 //!
 //! An episode has exactly **100** control steps of **0.05 s** (one world step with two substeps)
 //! and ends by the time limit only. Reset: p ~ U[−0.9, 0.9]², nose in any direction, then b and
-//! g ~ U[−0.95, 0.95]², drawn again until 0.75 ≤ ‖b − p‖ ≤ 1.3 and 0.75 ≤ ‖g − b‖ ≤ 1.3;
+//! g ~ U[−0.95, 0.95]², drawn again until 0.6 ≤ ‖b − p‖ ≤ 1.1 and 0.6 ≤ ‖g − b‖ ≤ 1.1;
 //! everything at rest, jaws open.
 //!
 //! # Taking and dropping
@@ -27,7 +27,7 @@
 //! | index | content | unit |
 //! |---|---|---|
 //! | 0–1 | p | 1.2 m |
-//! | 2–3 | velocity of the robot | 0.6 m/s |
+//! | 2–3 | velocity of the robot | 1 m/s |
 //! | 4–5 | n | – |
 //! | 6 | 2 o − 1 | – |
 //! | 7 | 1 while the object is held, else −1 | – |
@@ -38,7 +38,7 @@
 //! # Action
 //! | index | content |
 //! |---|---|
-//! | 0–1 | wanted velocity in world axes; 1 is 0.6 m/s; cut to the unit disc |
+//! | 0–1 | wanted velocity in world axes; 1 is 1 m/s; cut to the unit disc |
 //! | 2 | a: wanted openness of the jaws, (1 − a)/2; +1 closed, −1 open |
 //!
 //! # Reward
@@ -125,7 +125,7 @@ fn spec() -> EnvSpec {
         action_size: ACTION_SIZE,
         pose_size: POSE_SIZE,
         episode_len: EPISODE_LEN,
-        segment_len: 15,
+        segment_len: 12,
         control_period_s: f64::from(CONTROL_PERIOD_S),
         stages: STAGES.map(String::from).to_vec(),
     }
@@ -319,11 +319,11 @@ fn in_square(rng: &mut Rng, half: f64) -> [f32; 2] {
 }
 
 /// Far enough from `other` to be a way, near enough to leave time for the rest. The square's
-/// corners are further apart than 1.3 and its centre has room all around: it always ends.
+/// corners are further apart than 1.1 and its centre has room all around: it always ends.
 fn at_some_distance(rng: &mut Rng, other: [f32; 2]) -> [f32; 2] {
     loop {
         let place = in_square(rng, 0.95);
-        if (0.75..=1.3).contains(&norm([place[0] - other[0], place[1] - other[1]])) {
+        if (0.6..=1.1).contains(&norm([place[0] - other[0], place[1] - other[1]])) {
             return place;
         }
     }
