@@ -71,19 +71,20 @@ fn the_expert_passes_through_the_stages_in_order_and_lingers_in_each() {
 
 #[test]
 fn the_reward_grows_along_the_experts_way() {
+    let (mut losses, mut gains) = (0.0, 0.0);
     for seed in 0..50 {
         let rewards = play(seed, &mut expert).task_rewards;
-        // Turning at the start costs a little, and so does the way round when a taken object swings
-        // about the robot towards the goal.
-        let losses: f64 = rewards.windows(2).map(|w| (w[0] - w[1]).max(0.0)).sum();
-        let gains = rewards[rewards.len() - 1] - rewards[0];
-        assert!(
-            losses < 0.4 * gains,
-            "seed {seed}: lost {losses}, won {gains}"
-        );
+        // Turning at the start costs a little, and so does the way round when a taken object
+        // swings about the robot towards the goal.
+        losses += rewards
+            .windows(2)
+            .map(|w| (w[0] - w[1]).max(0.0))
+            .sum::<f64>();
+        gains += rewards[rewards.len() - 1] - rewards[0];
         let quarters: Vec<f64> = rewards.chunks(25).map(|c| c.iter().sum()).collect();
         assert!(quarters.is_sorted(), "seed {seed}: {quarters:?}");
     }
+    assert!(losses < 0.25 * gains, "lost {losses}, won {gains}");
 }
 
 #[test]
