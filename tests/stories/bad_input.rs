@@ -1,0 +1,184 @@
+//! What a person may type wrong: exit code 2 and one line that says what to do.
+
+use std::net::TcpListener;
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use super::server_process::{ServerProcess, stair};
+
+/// Runs the program and returns what it says on stderr; it must end with code 2.
+fn complaint(arguments: &[&str], folder: &Path) -> String {
+    let mut command: Command = stair();
+    let output = command
+        .args(arguments)
+        .current_dir(folder)
+        .stderr(Stdio::piped())
+        .output()
+        .expect("stair");
+    let told = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(
+        output.status.code(),
+        Some(2),
+        "stair {}: {told}",
+        arguments.join(" ")
+    );
+    told
+}
+
+fn expect(arguments: &[&str], folder: &Path, words: &[&str]) {
+    let told = complaint(arguments, folder);
+    for word in words {
+        assert!(
+            told.contains(word),
+            "stair {}: '{word}' is not in: {told}",
+            arguments.join(" ")
+        );
+    }
+    assert!(!told.contains("panicked"), "{told}");
+}
+
+#[test]
+fn a_wrong_name_is_answered_with_the_nearest_right_one() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let here = folder.path();
+    expect(
+        &["train", "windowopen"],
+        here,
+        &["windowopen", "window-open"],
+    );
+    expect(
+        &["train", "window-open", "--method", "stiar"],
+        here,
+        &["stiar", "did you mean 'stair'"],
+    );
+    expect(
+        &["train", "window-open", "--preset", "quik"],
+        here,
+        &["quik", "did you mean 'quick'"],
+    );
+    expect(
+        &["train", "window-open", "--teacher", "orcale"],
+        here,
+        &["orcale", "did you mean 'oracle'"],
+    );
+    expect(
+        &["evaluate", "window-opne", "--policy", "expert"],
+        here,
+        &["window-opne", "window-open"],
+    );
+    expect(
+        &["teach", "--run", "1", "--teacher", "orcale"],
+        here,
+        &["orcale", "did you mean 'oracle'"],
+    );
+}
+
+#[test]
+fn a_setting_that_does_not_fit_is_named_with_its_line() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let here = folder.path();
+    std::fs::write(
+        here.join("key.toml"),
+        "seed = 3\n\n[feedback]\nbugdet = 10\n",
+    )
+    .expect("a file");
+    std::fs::write(
+        here.join("value.toml"),
+        "seed = 3\n\n[feedback]\nbudget = \"ten\"\n",
+    )
+    .expect("a file");
+    std::fs::write(here.join("broken.toml"), "seed = \n").expect("a file");
+    let train = |file| ["train", "go-fetch-return", "--config", file];
+    expect(
+        &train("key.toml"),
+        here,
+        &["key.toml", "line 4", "bugdet", "did you mean `budget`"],
+    );
+    expect(&train("value.toml"), here, &["value.toml", "line 4", "ten"]);
+    expect(&train("broken.toml"), here, &["broken.toml", "line 1"]);
+    expect(&train("nowhere.toml"), here, &["nowhere.toml"]);
+    expect(
+        &["train", "go-fetch-return", "--set", "feedback.bugdet=3"],
+        here,
+        &["bugdet", "budget"],
+    );
+    expect(
+        &["train", "go-fetch-return", "--set", "environment.n_envs=0"],
+        here,
+        &["environment.n_envs", "0"],
+    );
+}
+
+#[test]
+fn a_policy_or_a_run_that_is_none_is_named() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let here = folder.path();
+    expect(
+        &["evaluate", "window-open", "--policy", "nowhere"],
+        here,
+        &["nowhere"],
+    );
+    expect(&["train", "--resume", "nowhere"], here, &["nowhere"]);
+    expect(
+        &["export", "--run", "1", "--data", "nowhere"],
+        here,
+        &["nowhere"],
+    );
+}
+
+#[test]
+fn a_port_in_use_and_a_folder_in_use_are_named() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let here = folder.path();
+    let taken = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let address = taken.local_addr().expect("an address").to_string();
+    let (_, taken_port) = address.split_once(':').expect("address and port");
+    expect(
+        &["serve", "--bind", &address, "--data", "mine"],
+        here,
+        &["in use", taken_port],
+    );
+
+    let data = here.join("held");
+    let _server = ServerProcess::start(&data);
+    expect(
+        &["serve", "--bind", "127.0.0.1:0", "--data", "held"],
+        here,
+        &["held"],
+    );
+}
+
+#[test]
+fn a_teacher_without_server_run_or_right_token_is_told_which() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let here = folder.path();
+    let unused = TcpListener::bind("127.0.0.1:0")
+        .expect("a port")
+        .local_addr()
+        .expect("an address");
+    let nobody = format!("http://{unused}");
+    expect(
+        &["teach", "--server", &nobody, "--run", "1"],
+        here,
+        &["cannot reach", &nobody, "stair serve"],
+    );
+    expect(
+        &["teach", "--server", "127.0.0.1:8080", "--run", "1"],
+        here,
+        &["http://"],
+    );
+
+    let server = ServerProcess::start(&here.join("data"));
+    let url = format!("http://{}", server.address);
+    expect(
+        &["teach", "--server", &url, "--run", "no-such-run"],
+        here,
+        &["no-such-run"],
+    );
+    let run = server.create_run("uniform", 1, "quick", &serde_json::json!({}));
+    expect(
+        &["teach", "--server", &url, "--run", &run, "--token", "wrong"],
+        here,
+        &["token"],
+    );
+}
