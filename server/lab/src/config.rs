@@ -503,7 +503,7 @@ fn parse_override(text: &str) -> Result<Table, ConfigError> {
 fn invalid(origin: &str, text: &str, error: &toml::de::Error) -> ConfigError {
     let line = error
         .span()
-        .map(|span| text[..span.start.min(text.len())].lines().count().max(1));
+        .map(|span| 1 + text[..span.start.min(text.len())].matches('\n').count());
     let place = line
         .map(|line| format!("line {line}: "))
         .unwrap_or_default();
