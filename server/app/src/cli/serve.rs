@@ -1,5 +1,6 @@
 //! `stair serve`: the server.
 
+use std::future::IntoFuture as _;
 use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -71,20 +72,18 @@ async fn serve(args: Args) -> anyhow::Result<()> {
         tracing::info!("stopping: runs leave a checkpoint and go on at the next start");
         let _ = closing.send(true); // nobody else listens when the server has failed already
     };
-    let serving = axum::serve(listener, router).with_graceful_shutdown(until_told);
-    // Streams of events never end by themselves, so the wait for requests in hand has an end.
-    let enough = async {
-        let _ = closed.wait_for(|is_closing| *is_closing).await;
-        live.close().await;
-        tokio::time::sleep(GRACE).await;
+    let mut serving = tokio::spawn(axum::serve(listener, router).with_graceful_shutdown(until_told).into_future());
+    let ended = tokio::select! {
+        ended = &mut serving => Some(ended),
+        _ = closed.wait_for(|is_closing| *is_closing) => None,
     };
-    tokio::select! {
-        served = serving => {
-            live.close().await;
-            served.context("the server stopped")
-        }
-        () = enough => Ok(()),
-    }
+    live.close().await;
+    let ended = match ended {
+        Some(ended) => ended,
+        // Streams of events never end by themselves, so the wait for requests in hand has an end.
+        None => tokio::time::timeout(GRACE, serving).await.unwrap_or(Ok(Ok(()))),
+    };
+    ended.context("the server stopped")?.context("the server stopped")
 }
 
 /// The secret that others must bring; none is needed where nobody else can come.

@@ -1,0 +1,8 @@
+//! Stories about the API, one file per resource.
+
+mod blinding;
+mod clips;
+mod leases;
+mod runs;
+mod store_on_disk;
+mod throughput;
