@@ -76,8 +76,8 @@ pub fn main() -> ExitCode {
         Command::Teach(args) => teach::run(args),
         Command::Render(args) => render::run(args),
         Command::Golden(args) => golden::run(&args),
-        Command::Tasks(args) => tasks::run(args),
-        Command::Export(args) => export::run(args),
+        Command::Tasks(args) => tasks::run(&args),
+        Command::Export(args) => export::run(&args),
         Command::Openapi(args) => openapi::run(&args),
     };
     result.unwrap_or_else(|error| {

@@ -15,7 +15,7 @@ use lab::message::{Command, Phase};
 use serde_json::Value;
 use store::{RunId, Store};
 use tokio::runtime::Handle;
-use tokio::sync::broadcast;
+use tokio::sync::{broadcast, watch};
 
 mod clip_worker;
 mod driver;
@@ -41,6 +41,8 @@ struct Inner {
     events: broadcast::Sender<LiveEvent>,
     runs: Mutex<BTreeMap<RunId, LiveRun>>,
     is_closing: AtomicBool,
+    /// Whether every thread has ended.
+    closed: watch::Sender<bool>,
 }
 
 /// A run whose thread is up, or was.
@@ -111,6 +113,7 @@ impl Live {
             events: broadcast::channel(BACKLOG).0,
             runs: Mutex::default(),
             is_closing: AtomicBool::new(false),
+            closed: watch::Sender::new(false),
         }));
         for run in live.0.store.runs().await.context("cannot read the runs")? {
             if run.is_trained && matches!(run.state.kind.as_str(), "training" | "waiting_for_labels") {
@@ -127,10 +130,10 @@ impl Live {
     /// # Errors
     /// [`LiveError`].
     pub fn spawn(&self, run: RunId) -> Result<(), LiveError> {
+        let mut runs = lock(&self.0.runs);
         if self.0.is_closing.load(Ordering::SeqCst) {
             return Err(LiveError::Closing);
         }
-        let mut runs = lock(&self.0.runs);
         if runs.get(&run).is_some_and(LiveRun::is_up) {
             return Ok(());
         }
@@ -215,27 +218,34 @@ impl Live {
     }
 
     /// Stops every run at a checkpoint, then the clip thread. The runs go on at the next start.
+    /// Whoever calls this returns when all is done, also when an earlier caller gave up waiting.
     pub async fn close(&self) {
-        self.0.is_closing.store(true, Ordering::SeqCst);
-        let inner = Arc::clone(&self.0);
-        let joined = tokio::task::spawn_blocking(move || {
-            let threads: Vec<_> = lock(&inner.runs)
-                .values_mut()
-                .filter_map(|run| {
-                    let _ = run.commands.send(Command::Stop); // a thread that has ended needs no telling
-                    run.thread.take()
-                })
-                .collect();
-            inner.clips.close();
-            let clips = lock(&inner.clip_thread).take();
-            for thread in threads.into_iter().chain(clips) {
-                // A panic inside a run was caught there; one outside was printed by the hook.
-                let _ = thread.join();
-            }
-        });
-        if let Err(error) = joined.await {
-            tracing::error!("the runs could not be stopped in order: {error}");
+        if !self.0.is_closing.swap(true, Ordering::SeqCst) {
+            let inner = Arc::clone(&self.0);
+            tokio::task::spawn_blocking(move || inner.stop_all());
         }
+        let mut closed = self.0.closed.subscribe();
+        // Fails only when the sender is gone, and it lives as long as `self`.
+        let _ = closed.wait_for(|is_closed| *is_closed).await;
+    }
+}
+
+impl Inner {
+    fn stop_all(&self) {
+        let threads: Vec<_> = lock(&self.runs)
+            .values_mut()
+            .filter_map(|run| {
+                let _ = run.commands.send(Command::Stop); // a thread that has ended needs no telling
+                run.thread.take()
+            })
+            .collect();
+        self.clips.close();
+        let clips = lock(&self.clip_thread).take();
+        for thread in threads.into_iter().chain(clips) {
+            // A panic inside a run was caught there; one outside was printed by the hook.
+            let _ = thread.join();
+        }
+        self.closed.send_replace(true);
     }
 }
 

@@ -50,10 +50,10 @@ enum Format {
 /// # Errors
 /// [`BadInput`] for an unknown run, a folder without data or held by a server; a file that
 /// cannot be written.
-pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let bytes = match &args.server {
-        Some(server) => from_server(server, &args)?,
-        None => from_folder(&args)?,
+        Some(server) => from_server(server, args)?,
+        None => from_folder(args)?,
     };
     match &args.out {
         Some(path) => std::fs::write(path, bytes)

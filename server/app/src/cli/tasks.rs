@@ -23,7 +23,7 @@ pub struct Args {
 /// # Errors
 /// None today; the signature is that of every command.
 #[expect(clippy::unnecessary_wraps, reason = "every command has this signature")]
-pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     if args.json {
         println!("{}", as_json());
     } else {
