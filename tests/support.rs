@@ -60,7 +60,11 @@ impl TestApp {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let run = seed(folder.path(), n_queries).to_string();
         prepare(folder.path());
-        Self { server: ServerProcess::start(folder.path()), run, folder }
+        Self {
+            server: ServerProcess::start(folder.path()),
+            run,
+            folder,
+        }
     }
 
     /// The data folder.
@@ -70,21 +74,34 @@ impl TestApp {
 
     /// Somebody without a name.
     pub(crate) fn stranger(&self) -> Client {
-        Client { address: self.server.address.clone(), header: None, run: self.run.clone() }
+        Client {
+            address: self.server.address.clone(),
+            header: None,
+            run: self.run.clone(),
+        }
     }
 
     /// A labeler's browser.
     pub(crate) fn labeler(&self, name: &str) -> Client {
-        let reply = self.stranger().send("POST", "/api/v1/labelers", Some(&json!({"name": name}))).expect(201);
+        let reply = self
+            .stranger()
+            .send("POST", "/api/v1/labelers", Some(&json!({"name": name})))
+            .expect(201);
         let cookie = reply.headers["set-cookie"].to_str().expect("text");
         let cookie = cookie.split(';').next().expect("a pair").to_owned();
-        Client { header: Some(("cookie", cookie)), ..self.stranger() }
+        Client {
+            header: Some(("cookie", cookie)),
+            ..self.stranger()
+        }
     }
 
     /// A program with a teacher token.
     pub(crate) fn program(&self) -> Client {
         let token = self.server.teacher_token(&self.run);
-        Client { header: Some(("authorization", format!("Bearer {token}"))), ..self.stranger() }
+        Client {
+            header: Some(("authorization", format!("Bearer {token}"))),
+            ..self.stranger()
+        }
     }
 }
 
@@ -95,32 +112,58 @@ impl Client {
     }
 
     /// One request with a body of any kind and more headers.
-    pub(crate) fn send_with(&self, method: &str, path: &str, body: Option<String>, headers: &[(&str, &str)]) -> Reply {
-        let mut request = Request::builder().method(method).uri(format!("http://{}{path}", self.address));
-        for (name, value) in self.header.iter().map(|(n, v)| (*n, v.as_str())).chain(headers.iter().copied()) {
+    pub(crate) fn send_with(
+        &self,
+        method: &str,
+        path: &str,
+        body: Option<String>,
+        headers: &[(&str, &str)],
+    ) -> Reply {
+        let mut request = Request::builder()
+            .method(method)
+            .uri(format!("http://{}{path}", self.address));
+        for (name, value) in self
+            .header
+            .iter()
+            .map(|(n, v)| (*n, v.as_str()))
+            .chain(headers.iter().copied())
+        {
             request = request.header(name, value);
         }
         if body.is_some() {
             request = request.header("content-type", "application/json");
         }
         let request = request.body(body.unwrap_or_default()).expect("a request");
-        let config = Agent::config_builder().http_status_as_error(false).proxy(None).timeout_global(Some(PATIENCE));
+        let config = Agent::config_builder()
+            .http_status_as_error(false)
+            .proxy(None)
+            .timeout_global(Some(PATIENCE));
         let agent: Agent = config.build().into();
         let mut response: Response<Body> = agent.run(request).expect("a reply");
         let text = response.body_mut().read_to_string().unwrap_or_default();
-        Reply { status: response.status().as_u16(), headers: response.headers().clone(), text }
+        Reply {
+            status: response.status().as_u16(),
+            headers: response.headers().clone(),
+            text,
+        }
     }
 
     /// Open leases, topped up to `count`.
     pub(crate) fn leases(&self, count: u32) -> Vec<Value> {
         let path = format!("/api/v1/runs/{}/leases", self.run);
-        let reply = self.send("POST", &path, Some(&json!({"count": count}))).expect(200).json();
+        let reply = self
+            .send("POST", &path, Some(&json!({"count": count})))
+            .expect(200)
+            .json();
         reply["leases"].as_array().expect("a list").clone()
     }
 
     /// Answers a lease.
     pub(crate) fn answers(&self, lease: &Value, body: &Value) -> Reply {
-        let path = format!("/api/v1/leases/{}/answer", lease["lease_id"].as_str().expect("an id"));
+        let path = format!(
+            "/api/v1/leases/{}/answer",
+            lease["lease_id"].as_str().expect("an id")
+        );
         self.send("PUT", &path, Some(body))
     }
 
@@ -128,14 +171,20 @@ impl Client {
     pub(crate) fn labels(&self) -> Vec<Value> {
         let path = format!("/api/v1/runs/{}/labels?format=jsonl", self.run);
         let text = self.send("GET", &path, None).expect(200).text;
-        text.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect()
+        text.lines()
+            .map(|line| serde_json::from_str(line).expect("JSON"))
+            .collect()
     }
 }
 
 /// A query of which nothing but its number matters.
 pub(crate) fn query(index: u32) -> OfferedQuery {
     let record = |episode: u32, reward: f64| SegmentRecord {
-        segment: Segment { episode: EpisodeId(episode), start: 5, len: 4 },
+        segment: Segment {
+            episode: EpisodeId(episode),
+            start: 5,
+            len: 4,
+        },
         poses: vec![vec![0.5, 1.5]; 4],
         task_rewards: vec![TaskReward(reward); 4],
         stages: vec![0; 4],
@@ -168,7 +217,14 @@ pub(crate) fn collection() -> NewRun {
 
 /// Bytes that are told apart by `n`.
 pub(crate) fn clip(n: u64) -> NewClip {
-    NewClip { bytes: format!("clip number {n:06}").into_bytes(), sha256: format!("{n:064x}"), n_frames: 4, fps: 20, width: 8, height: 8 }
+    NewClip {
+        bytes: format!("clip number {n:06}").into_bytes(),
+        sha256: format!("{n:064x}"),
+        n_frames: 4,
+        fps: 20,
+        width: 8,
+        height: 8,
+    }
 }
 
 /// Puts a collection with clips into a folder that no server holds.
@@ -178,10 +234,16 @@ pub(crate) fn seed(folder: &Path, n_queries: u32) -> RunId {
         let store = Store::open(folder).await.expect("a store");
         let run = store.add_run(collection()).await.expect("a run");
         let queries: Vec<OfferedQuery> = (0..n_queries).map(query).collect();
-        store.offer(run, &queries, true).await.expect("stored queries");
+        store
+            .offer(run, &queries, true)
+            .await
+            .expect("stored queries");
         while let Some(job) = store.next_clip_job().await.expect("a job") {
             let n = 2 * job.query.0.unsigned_abs();
-            store.attach_clips(job.query, &clip(n), &clip(n + 1)).await.expect("stored clips");
+            store
+                .attach_clips(job.query, &clip(n), &clip(n + 1))
+                .await
+                .expect("stored clips");
         }
         run
     })

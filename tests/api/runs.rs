@@ -10,16 +10,29 @@ use crate::support::TestApp;
 #[test]
 fn every_address_that_answers_is_documented_and_the_other_way_round() {
     let app = TestApp::start(1);
-    let document = app.stranger().send("GET", "/api/v1/openapi.json", None).expect(200).json();
+    let document = app
+        .stranger()
+        .send("GET", "/api/v1/openapi.json", None)
+        .expect(200)
+        .json();
     assert_eq!(document["openapi"], "3.1.0");
     let paths = document["paths"].as_object().expect("paths");
     let router = include_str!("../../server/app/src/router.rs");
     for path in paths.keys() {
-        assert!(router.contains(&format!("\"{path}\"")), "{path} is documented but not served");
+        assert!(
+            router.contains(&format!("\"{path}\"")),
+            "{path} is documented but not served"
+        );
     }
-    for line in router.lines().filter(|line| line.contains("\"/api/v1/") && !line.contains("openapi.json")) {
+    for line in router
+        .lines()
+        .filter(|line| line.contains("\"/api/v1/") && !line.contains("openapi.json"))
+    {
         let path = line.split('"').nth(1).expect("a quoted path");
-        assert!(paths.contains_key(path), "{path} is served but not documented");
+        assert!(
+            paths.contains_key(path),
+            "{path} is served but not documented"
+        );
     }
 }
 
@@ -28,15 +41,30 @@ fn a_run_that_cannot_be_started_says_what_is_wrong() {
     let app = TestApp::start(1);
     let all = app.stranger();
     let refuse = |body: serde_json::Value, word: &str| {
-        let told = all.send("POST", "/api/v1/runs", Some(&body)).expect(422).json();
-        assert!(told["detail"].as_str().is_some_and(|d| d.contains(word)), "{told}");
-        assert!(told["request_id"].as_str().is_some_and(|id| !id.is_empty()), "{told}");
+        let told = all
+            .send("POST", "/api/v1/runs", Some(&body))
+            .expect(422)
+            .json();
+        assert!(
+            told["detail"].as_str().is_some_and(|d| d.contains(word)),
+            "{told}"
+        );
+        assert!(
+            told["request_id"].as_str().is_some_and(|id| !id.is_empty()),
+            "{told}"
+        );
     };
     refuse(json!({"task": "window-opne"}), "window-open");
     refuse(json!({"task": "window-open", "method": "stiar"}), "stair");
     refuse(json!({"task": "window-open", "preset": "quik"}), "quick");
-    refuse(json!({"task": "window-open", "teacher": "orcale"}), "oracle");
-    refuse(json!({"task": "window-open", "settings": {"agent": {"bach": 3}}}), "bach");
+    refuse(
+        json!({"task": "window-open", "teacher": "orcale"}),
+        "oracle",
+    );
+    refuse(
+        json!({"task": "window-open", "settings": {"agent": {"bach": 3}}}),
+        "bach",
+    );
     refuse(json!({"task": "window-open", "colour": "red"}), "colour");
     all.send("GET", "/api/v1/runs/99", None).expect(404);
     all.send("GET", "/api/v1/runs/none", None).expect(404);
@@ -49,11 +77,25 @@ fn a_page_of_another_site_can_change_nothing() {
     let app = TestApp::start(1);
     let all = app.stranger();
     let body = Some(json!({"name": "Eve"}).to_string());
-    all.send_with("POST", "/api/v1/labelers", body.clone(), &[("origin", "http://evil.example")]).expect(403);
-    all.send_with("POST", "/api/v1/labelers", body.clone(), &[("sec-fetch-site", "cross-site")]).expect(403);
-    all.send_with("GET", "/api/v1/runs", None, &[("host", "evil.example")]).expect(403);
+    all.send_with(
+        "POST",
+        "/api/v1/labelers",
+        body.clone(),
+        &[("origin", "http://evil.example")],
+    )
+    .expect(403);
+    all.send_with(
+        "POST",
+        "/api/v1/labelers",
+        body.clone(),
+        &[("sec-fetch-site", "cross-site")],
+    )
+    .expect(403);
+    all.send_with("GET", "/api/v1/runs", None, &[("host", "evil.example")])
+        .expect(403);
     let own = format!("http://{}", app.server.address);
-    all.send_with("POST", "/api/v1/labelers", body, &[("origin", &own)]).expect(201);
+    all.send_with("POST", "/api/v1/labelers", body, &[("origin", &own)])
+        .expect(201);
 }
 
 #[test]
@@ -62,18 +104,38 @@ fn both_exports_hold_the_same_rows() {
     let ada = app.labeler("Ada, \"the first\"");
     let timing = json!({"visible_ms": 812, "hidden_ms": 0, "loops": 1.5, "seeks": 2, "speed": 1, "dropped_frames": 0, "input": "key"});
     for lease in ada.leases(3) {
-        let word = if lease["question"] == "preference" { "left" } else { "same" };
-        ada.answers(&lease, &json!({"answer": word, "guidance_sha256": "ab", "timing": timing})).expect(201);
+        let word = if lease["question"] == "preference" {
+            "left"
+        } else {
+            "same"
+        };
+        ada.answers(
+            &lease,
+            &json!({"answer": word, "guidance_sha256": "ab", "timing": timing}),
+        )
+        .expect(201);
     }
     let labels = ada.labels();
     assert_eq!(labels[0]["visible_ms"], 812);
     assert_eq!(labels[0]["labeler"], "Ada, \"the first\"");
-    let csv = ada.send("GET", &format!("/api/v1/runs/{}/labels?format=csv", app.run), None).expect(200).text;
+    let csv = ada
+        .send(
+            "GET",
+            &format!("/api/v1/runs/{}/labels?format=csv", app.run),
+            None,
+        )
+        .expect(200)
+        .text;
     assert_eq!(csv.lines().count(), 1 + labels.len());
     assert!(csv.contains("\"Ada, \"\"the first\"\"\""), "{csv}");
     let columns = csv.lines().next().expect("a header").split(',').count();
     assert_eq!(columns, labels[0].as_object().expect("a row").len());
-    ada.send("GET", &format!("/api/v1/runs/{}/labels?format=xls", app.run), None).expect(422);
+    ada.send(
+        "GET",
+        &format!("/api/v1/runs/{}/labels?format=xls", app.run),
+        None,
+    )
+    .expect(422);
 }
 
 #[test]
@@ -81,13 +143,21 @@ fn a_follower_that_comes_back_misses_no_event() {
     let app = TestApp::start(4);
     let ada = app.labeler("Ada");
     let leases = ada.leases(4);
-    let word = |lease: &serde_json::Value| if lease["question"] == "preference" { "left" } else { "same" };
+    let word = |lease: &serde_json::Value| {
+        if lease["question"] == "preference" {
+            "left"
+        } else {
+            "same"
+        }
+    };
     for lease in &leases[..2] {
-        ada.answers(lease, &json!({"answer": word(lease)})).expect(201);
+        ada.answers(lease, &json!({"answer": word(lease)}))
+            .expect(201);
     }
     let seen = answers_seen(&app, 0, 2);
     for lease in &leases[2..] {
-        ada.answers(lease, &json!({"answer": word(lease)})).expect(201);
+        ada.answers(lease, &json!({"answer": word(lease)}))
+            .expect(201);
     }
     let later = answers_seen(&app, seen[1], 2);
     assert!(later.iter().all(|id| *id > seen[1]), "{seen:?} {later:?}");
@@ -97,8 +167,12 @@ fn a_follower_that_comes_back_misses_no_event() {
 fn answers_seen(app: &TestApp, last: u64, n: usize) -> Vec<u64> {
     let mut stream = TcpStream::connect(&app.server.address).expect("a connection");
     let host = &app.server.address;
-    write!(stream, "GET /api/v1/runs/{}/events HTTP/1.1\r\nhost: {host}\r\nlast-event-id: {last}\r\n\r\n", app.run)
-        .expect("a request");
+    write!(
+        stream,
+        "GET /api/v1/runs/{}/events HTTP/1.1\r\nhost: {host}\r\nlast-event-id: {last}\r\n\r\n",
+        app.run
+    )
+    .expect("a request");
     let (mut ids, mut id, mut is_answer) = (Vec::new(), 0, false);
     for line in BufReader::new(stream).lines() {
         let line = line.expect("a line");

@@ -17,7 +17,10 @@ fn a_data_folder_that_another_server_holds_is_refused_with_its_number() {
         .expect("stair serve");
     let told = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(2), "{told}");
-    assert!(told.contains("another server holds the data folder") && told.contains("process"), "{told}");
+    assert!(
+        told.contains("another server holds the data folder") && told.contains("process"),
+        "{told}"
+    );
 }
 
 #[test]
@@ -39,7 +42,9 @@ async fn a_data_folder_that_is_a_file_is_refused_in_words() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let file = folder.path().join("file");
     std::fs::write(&file, "no folder").expect("a file");
-    let Err(error) = Store::open(&file).await else { panic!("it was opened") };
+    let Err(error) = Store::open(&file).await else {
+        panic!("it was opened")
+    };
     assert!(matches!(error, StoreError::Folder { .. }), "{error}");
 }
 
@@ -50,7 +55,10 @@ async fn what_is_stored_is_there_after_the_migrations_ran_again() {
     let store = Store::open(folder.path()).await.expect("the store again");
     let answers: Vec<Answered> = store.answers_after(run, 0).await.expect("answers");
     assert_eq!(answers.len(), 1);
-    store.offer(run, &[query(0), query(1)], true).await.expect("asked again");
+    store
+        .offer(run, &[query(0), query(1)], true)
+        .await
+        .expect("asked again");
     assert_eq!(store.progress(run).await.expect("progress").session_size, 2);
 }
 
@@ -61,15 +69,30 @@ async fn a_lease_that_ran_out_goes_to_the_next_labeler_and_the_late_answer_is_ke
     let (ada, _) = store.sign_in("Ada").await.expect("Ada");
     let (bo, _) = store.sign_in("Bo").await.expect("Bo");
     let now = now_ms();
-    let first = store.lease(run, ada.id, 1, true, now).await.expect("a lease");
-    assert!(store.lease(run, bo.id, 1, true, now).await.expect("none").is_empty());
+    let first = store
+        .lease(run, ada.id, 1, true, now)
+        .await
+        .expect("a lease");
+    assert!(
+        store
+            .lease(run, bo.id, 1, true, now)
+            .await
+            .expect("none")
+            .is_empty()
+    );
     assert_eq!(store.queue(run, bo.id).await.expect("a queue").n_held, 1);
     let later = now + 11 * 60 * 1000;
-    let second = store.lease(run, bo.id, 1, true, later).await.expect("taken over");
+    let second = store
+        .lease(run, bo.id, 1, true, later)
+        .await
+        .expect("taken over");
     assert_eq!(second[0].query, first[0].query);
     let late = store.answer(&first[0].id, ada.id, left()).await;
     assert!(matches!(late, Err(StoreError::Taken)), "{late:?}");
-    store.answer(&second[0].id, bo.id, left()).await.expect("Bo's answer");
+    store
+        .answer(&second[0].id, bo.id, left())
+        .await
+        .expect("Bo's answer");
     assert_eq!(store.answers_after(run, 0).await.expect("answers").len(), 1);
 }
 
@@ -79,8 +102,17 @@ async fn an_overdue_answer_counts_when_nobody_else_has_the_question() {
     let (store, run) = with_one_query(folder.path()).await;
     let (ada, _) = store.sign_in("Ada").await.expect("Ada");
     let long_ago = now_ms() - 60 * 60 * 1000;
-    let lease = store.lease(run, ada.id, 1, true, long_ago).await.expect("a lease");
-    assert!(store.answer(&lease[0].id, ada.id, left()).await.expect("stored").is_new);
+    let lease = store
+        .lease(run, ada.id, 1, true, long_ago)
+        .await
+        .expect("a lease");
+    assert!(
+        store
+            .answer(&lease[0].id, ada.id, left())
+            .await
+            .expect("stored")
+            .is_new
+    );
 }
 
 #[tokio::test]
@@ -91,10 +123,19 @@ async fn a_query_that_cannot_be_drawn_is_skipped_by_the_server_and_shown_to_the_
     store.offer(run, &[query(0)], true).await.expect("stored");
     let job = store.next_clip_job().await.expect("a job").expect("one");
     assert_eq!(job.first, vec![vec![0.5, 1.5]; 4]);
-    store.clip_failed(job.query, "no such pose").await.expect("noted");
+    store
+        .clip_failed(job.query, "no such pose")
+        .await
+        .expect("noted");
     let answers = store.answers_after(run, 0).await.expect("answers");
-    assert_eq!(answers.iter().map(|a| a.preference).collect::<Vec<_>>(), [None]);
-    assert_eq!(store.bad_queries(run).await.expect("bad")[0].trouble, "no such pose");
+    assert_eq!(
+        answers.iter().map(|a| a.preference).collect::<Vec<_>>(),
+        [None]
+    );
+    assert_eq!(
+        store.bad_queries(run).await.expect("bad")[0].trouble,
+        "no such pose"
+    );
     assert!(store.next_clip_job().await.expect("none").is_none());
 }
 
@@ -103,18 +144,30 @@ async fn with_one_query(folder: &std::path::Path) -> (Store, RunId) {
     let run = store.add_run(collection()).await.expect("a run");
     store.offer(run, &[query(1)], true).await.expect("stored");
     let job = store.next_clip_job().await.expect("a job").expect("one");
-    store.attach_clips(job.query, &clip(1), &clip(2)).await.expect("clips");
+    store
+        .attach_clips(job.query, &clip(1), &clip(2))
+        .await
+        .expect("clips");
     (store, run)
 }
 
 async fn answered_once(folder: &std::path::Path) -> RunId {
     let (store, run) = with_one_query(folder).await;
     let (ada, _) = store.sign_in("Ada").await.expect("Ada");
-    let lease = store.lease(run, ada.id, 1, true, now_ms()).await.expect("a lease");
-    store.answer(&lease[0].id, ada.id, left()).await.expect("stored");
+    let lease = store
+        .lease(run, ada.id, 1, true, now_ms())
+        .await
+        .expect("a lease");
+    store
+        .answer(&lease[0].id, ada.id, left())
+        .await
+        .expect("stored");
     run
 }
 
 fn left() -> NewAnswer {
-    NewAnswer { pressed: "left".into(), ..NewAnswer::default() }
+    NewAnswer {
+        pressed: "left".into(),
+        ..NewAnswer::default()
+    }
 }

@@ -23,7 +23,11 @@ fn many_programs_answer_at_once_and_every_answer_is_kept() {
                         break;
                     }
                     for lease in &leases {
-                        let word = if lease["question"] == "preference" { "left" } else { "same" };
+                        let word = if lease["question"] == "preference" {
+                            "left"
+                        } else {
+                            "same"
+                        };
                         let sent = Instant::now();
                         labeler.answers(lease, &json!({"answer": word})).expect(201);
                         times.push(sent.elapsed());
@@ -33,7 +37,10 @@ fn many_programs_answer_at_once_and_every_answer_is_kept() {
             })
         });
         let clients: Vec<_> = clients.collect();
-        clients.into_iter().flat_map(|client| client.join().expect("answers")).collect()
+        clients
+            .into_iter()
+            .flat_map(|client| client.join().expect("answers"))
+            .collect()
     });
     let took = began.elapsed();
     assert_eq!(app.stranger().labels().len(), times.len());

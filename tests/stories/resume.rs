@@ -31,7 +31,16 @@ fn stair() -> Command {
 
 fn start(folder: &Path) -> Command {
     let mut command = stair();
-    command.args(["train", "go-fetch-return", "--method", "stair", "--json", "--out"]).arg(folder);
+    command
+        .args([
+            "train",
+            "go-fetch-return",
+            "--method",
+            "stair",
+            "--json",
+            "--out",
+        ])
+        .arg(folder);
     for setting in SETTINGS {
         command.args(["--set", setting]);
     }
@@ -47,7 +56,10 @@ fn go_on(folder: &Path) -> Command {
 /// The final weights' fingerprint from the JSON object that `stair train --json` ends with.
 fn weights(output: &[u8]) -> String {
     let row: serde_json::Value = serde_json::from_slice(output).expect("one JSON object");
-    row["weights"].as_str().expect("the fingerprint of the weights").to_owned()
+    row["weights"]
+        .as_str()
+        .expect("the fingerprint of the weights")
+        .to_owned()
 }
 
 #[test]
@@ -64,7 +76,11 @@ fn a_run_killed_twenty_times_ends_with_the_weights_of_one_left_alone() {
     let mut n_killed = 0;
     while n_killed < N_KILLS {
         let is_started = hunted.join("config.toml").exists();
-        let mut command = if is_started { go_on(&hunted) } else { start(&hunted) };
+        let mut command = if is_started {
+            go_on(&hunted)
+        } else {
+            start(&hunted)
+        };
         let mut child = command.stdout(Stdio::null()).spawn().expect("stair train");
         let patience = Duration::from_secs_f64(whole.as_secs_f64() * rng.uniform_in(0.02, 0.25));
         std::thread::sleep(patience); // the moment of the kill is the point of this story

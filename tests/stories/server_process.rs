@@ -89,7 +89,13 @@ impl ServerProcess {
     }
 
     /// Starts a run that programs answer; its id.
-    pub(crate) fn create_run(&self, method: &str, seed: u64, preset: &str, settings: &Value) -> String {
+    pub(crate) fn create_run(
+        &self,
+        method: &str,
+        seed: u64,
+        preset: &str,
+        settings: &Value,
+    ) -> String {
         let body = json!({
             "task": "go-fetch-return", "method": method, "preset": preset, "seed": seed, "teacher": "http",
             "settings": settings,

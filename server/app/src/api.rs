@@ -15,11 +15,31 @@ pub mod tasks;
 /// OpenAPI 3.1, generated from the handlers.
 #[derive(OpenApi)]
 #[openapi(
-    info(title = "STAIR", description = "Train agents from human preferences. Problems are RFC 9457."),
+    info(
+        title = "STAIR",
+        description = "Train agents from human preferences. Problems are RFC 9457."
+    ),
     paths(
-        tasks::list, runs::list, runs::create, runs::read, runs::pause, runs::resume, runs::stop, runs::create_token,
-        leases::create, leases::heartbeat, leases::answer, queries::task_rewards, clips::file, clips::of_run,
-        events::follow, events::metrics, labels::export, labelers::create, health::livez, health::readyz,
+        tasks::list,
+        runs::list,
+        runs::create,
+        runs::read,
+        runs::pause,
+        runs::resume,
+        runs::stop,
+        runs::create_token,
+        leases::create,
+        leases::heartbeat,
+        leases::answer,
+        queries::task_rewards,
+        clips::file,
+        clips::of_run,
+        events::follow,
+        events::metrics,
+        labels::export,
+        labelers::create,
+        health::livez,
+        health::readyz,
         health::metrics,
     )
 )]

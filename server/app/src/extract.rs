@@ -54,14 +54,21 @@ where
         let app = AppState::from_ref(state);
         if let Some(secret) = bearer(&parts.headers) {
             return match app.store.bearer(&secret).await? {
-                Some(Bearer { kind: TokenKind::Teacher(run), labeler: Some(labeler) }) => {
-                    Ok(Self { labeler, teaches: Some(run) })
-                }
+                Some(Bearer {
+                    kind: TokenKind::Teacher(run),
+                    labeler: Some(labeler),
+                }) => Ok(Self {
+                    labeler,
+                    teaches: Some(run),
+                }),
                 _ => Err(Problem::who_are_you()),
             };
         }
         match labeler(&app, &parts.headers).await? {
-            Some(labeler) => Ok(Self { labeler, teaches: None }),
+            Some(labeler) => Ok(Self {
+                labeler,
+                teaches: None,
+            }),
             None => Err(Problem::who_are_you()),
         }
     }
@@ -72,9 +79,13 @@ where
 /// # Errors
 /// When the store cannot be read.
 pub async fn labeler(app: &AppState, headers: &HeaderMap) -> Result<Option<Labeler>, Problem> {
-    let Some(secret) = cookie(headers, LABELER_COOKIE) else { return Ok(None) };
+    let Some(secret) = cookie(headers, LABELER_COOKIE) else {
+        return Ok(None);
+    };
     let bearer = app.store.bearer(&Secret::brought(secret)).await?;
-    Ok(bearer.filter(|bearer| bearer.kind == TokenKind::Labeler).and_then(|bearer| bearer.labeler))
+    Ok(bearer
+        .filter(|bearer| bearer.kind == TokenKind::Labeler)
+        .and_then(|bearer| bearer.labeler))
 }
 
 /// The secret in `Authorization: Bearer …`.
@@ -97,5 +108,8 @@ pub fn cookie<'h>(headers: &'h HeaderMap, name: &str) -> Option<&'h str> {
 
 /// A cookie for a year that scripts cannot read and other sites cannot send.
 pub fn set_cookie(name: &str, secret: &Secret) -> String {
-    format!("{name}={}; Path=/; Max-Age=31536000; HttpOnly; SameSite=Strict", secret.reveal())
+    format!(
+        "{name}={}; Path=/; Max-Age=31536000; HttpOnly; SameSite=Strict",
+        secret.reveal()
+    )
 }

@@ -27,14 +27,23 @@ pub fn n_requests() -> u64 {
 
 /// Gives the request an id, fills it into problems, and adds the headers that every reply has.
 pub async fn number(request: Request, next: Next) -> Response {
-    let id = format!("{:x}-{:x}", std::process::id(), N_REQUESTS.fetch_add(1, Ordering::Relaxed));
+    let id = format!(
+        "{:x}-{:x}",
+        std::process::id(),
+        N_REQUESTS.fetch_add(1, Ordering::Relaxed)
+    );
     let path = request.uri().path().to_owned();
     let mut response = next.run(request).await;
     if let Some(problem) = response.extensions().get::<Problem>().cloned() {
         if problem.status >= 500 {
             tracing::warn!(request.id = %id, "{path}: {} {}", problem.status, problem.detail);
         }
-        let mut told = Problem { instance: path, request_id: id.clone(), ..problem }.into_response();
+        let mut told = Problem {
+            instance: path,
+            request_id: id.clone(),
+            ..problem
+        }
+        .into_response();
         for (name, value) in response.headers() {
             if name == header::SET_COOKIE || name == header::RETRY_AFTER {
                 told.headers_mut().insert(name, value.clone());
@@ -44,23 +53,41 @@ pub async fn number(request: Request, next: Next) -> Response {
     }
     let headers = response.headers_mut();
     headers.insert("content-security-policy", HeaderValue::from_static(POLICY));
-    headers.insert("x-content-type-options", HeaderValue::from_static("nosniff"));
+    headers.insert(
+        "x-content-type-options",
+        HeaderValue::from_static("nosniff"),
+    );
     headers.insert("referrer-policy", HeaderValue::from_static("same-origin"));
-    headers.insert("cross-origin-opener-policy", HeaderValue::from_static("same-origin"));
-    headers.insert("cross-origin-resource-policy", HeaderValue::from_static("same-origin"));
+    headers.insert(
+        "cross-origin-opener-policy",
+        HeaderValue::from_static("same-origin"),
+    );
+    headers.insert(
+        "cross-origin-resource-policy",
+        HeaderValue::from_static("same-origin"),
+    );
     if let Ok(id) = HeaderValue::from_str(&id) {
         headers.insert("x-request-id", id);
     }
-    headers.entry(header::CACHE_CONTROL).or_insert(HeaderValue::from_static("no-store"));
+    headers
+        .entry(header::CACHE_CONTROL)
+        .or_insert(HeaderValue::from_static("no-store"));
     response
 }
 
 /// Refuses requests under a foreign name (DNS rebinding), changes that another site makes
 /// (CSRF), and, where the server listens on a network, requests without a token.
 pub async fn admit(State(app): State<AppState>, request: Request, next: Next) -> Response {
-    let is_change = !matches!(*request.method(), Method::GET | Method::HEAD | Method::OPTIONS);
+    let is_change = !matches!(
+        *request.method(),
+        Method::GET | Method::HEAD | Method::OPTIONS
+    );
     let checked = check_host(request.headers(), app.needs_token).and_then(|()| {
-        if is_change { check_origin(request.headers()) } else { Ok(()) }
+        if is_change {
+            check_origin(request.headers())
+        } else {
+            Ok(())
+        }
     });
     if let Err(problem) = checked {
         return problem.into_response();
@@ -83,21 +110,34 @@ fn check_host(headers: &HeaderMap, is_on_network: bool) -> Result<(), Problem> {
     if is_local || is_on_network {
         return Ok(());
     }
-    Err(Problem::foreign(format!("This server is not {}; open it as http://127.0.0.1 or http://localhost.", host.host())))
+    Err(Problem::foreign(format!(
+        "This server is not {}; open it as http://127.0.0.1 or http://localhost.",
+        host.host()
+    )))
 }
 
 fn check_origin(headers: &HeaderMap) -> Result<(), Problem> {
-    let site = headers.get("sec-fetch-site").and_then(|site| site.to_str().ok());
+    let site = headers
+        .get("sec-fetch-site")
+        .and_then(|site| site.to_str().ok());
     if !matches!(site, None | Some("same-origin" | "none")) {
-        return Err(Problem::foreign("A page of another site tried to change something here."));
+        return Err(Problem::foreign(
+            "A page of another site tried to change something here.",
+        ));
     }
-    let Some(origin) = headers.get(header::ORIGIN) else { return Ok(()) };
+    let Some(origin) = headers.get(header::ORIGIN) else {
+        return Ok(());
+    };
     let origin = origin.to_str().unwrap_or_default();
-    let authority = origin.split_once("://").and_then(|(_, rest)| rest.parse::<Authority>().ok());
+    let authority = origin
+        .split_once("://")
+        .and_then(|(_, rest)| rest.parse::<Authority>().ok());
     if authority.is_some() && authority == host(headers) {
         return Ok(());
     }
-    Err(Problem::foreign(format!("A page of {origin} tried to change something here.")))
+    Err(Problem::foreign(format!(
+        "A page of {origin} tried to change something here."
+    )))
 }
 
 fn host(headers: &HeaderMap) -> Option<Authority> {
@@ -120,7 +160,15 @@ mod tests {
     use super::*;
 
     fn headers(pairs: &[(&'static str, &'static str)]) -> HeaderMap {
-        pairs.iter().map(|(name, value)| (header::HeaderName::from_static(name), HeaderValue::from_static(value))).collect()
+        pairs
+            .iter()
+            .map(|(name, value)| {
+                (
+                    header::HeaderName::from_static(name),
+                    HeaderValue::from_static(value),
+                )
+            })
+            .collect()
     }
 
     #[test]
@@ -133,11 +181,17 @@ mod tests {
 
     #[test]
     fn a_change_from_another_site_is_refused() {
-        let own = [("host", "127.0.0.1:8080"), ("origin", "http://127.0.0.1:8080")];
+        let own = [
+            ("host", "127.0.0.1:8080"),
+            ("origin", "http://127.0.0.1:8080"),
+        ];
         assert!(check_origin(&headers(&own)).is_ok());
         assert!(check_origin(&headers(&own[..1])).is_ok());
         for origin in ["http://evil.example", "http://127.0.0.1:9999", "null"] {
-            assert!(check_origin(&headers(&[own[0], ("origin", origin)])).is_err(), "{origin}");
+            assert!(
+                check_origin(&headers(&[own[0], ("origin", origin)])).is_err(),
+                "{origin}"
+            );
         }
         assert!(check_origin(&headers(&[own[0], ("sec-fetch-site", "cross-site")])).is_err());
     }

@@ -116,7 +116,9 @@ impl Live {
             closed: watch::Sender::new(false),
         }));
         for run in live.0.store.runs().await.context("cannot read the runs")? {
-            if run.is_trained && matches!(run.state.kind.as_str(), "training" | "waiting_for_labels") {
+            if run.is_trained
+                && matches!(run.state.kind.as_str(), "training" | "waiting_for_labels")
+            {
                 tracing::info!(run.id = %run.id, "going on with run {}", run.id);
                 live.spawn(run.id)?;
             }
@@ -138,10 +140,22 @@ impl Live {
             return Ok(());
         }
         let (commands, inbox) = channel();
-        let now = Arc::new(Mutex::new(Now { line: Some(StateLine::opening()), ..Now::default() }));
+        let now = Arc::new(Mutex::new(Now {
+            line: Some(StateLine::opening()),
+            ..Now::default()
+        }));
         let driver = driver::Driver::new(Arc::clone(&self.0), run, Arc::clone(&now));
-        let thread = std::thread::Builder::new().name(format!("run {run}")).spawn(move || driver.run(&inbox))?;
-        runs.insert(run, LiveRun { commands, thread: Some(thread), now });
+        let thread = std::thread::Builder::new()
+            .name(format!("run {run}"))
+            .spawn(move || driver.run(&inbox))?;
+        runs.insert(
+            run,
+            LiveRun {
+                commands,
+                thread: Some(thread),
+                now,
+            },
+        );
         Ok(())
     }
 
@@ -174,10 +188,17 @@ impl Live {
 
     fn command(&self, run: RunId, command: Command) -> Result<(), LiveError> {
         let runs = lock(&self.0.runs);
-        let live = runs.get(&run).filter(|live| live.is_up()).ok_or(LiveError::NotUp)?;
+        let live = runs
+            .get(&run)
+            .filter(|live| live.is_up())
+            .ok_or(LiveError::NotUp)?;
         let mut now = lock(&live.now);
         if now.is_stopping {
-            return if command == Command::Stop { Ok(()) } else { Err(LiveError::Stopping) };
+            return if command == Command::Stop {
+                Ok(())
+            } else {
+                Err(LiveError::Stopping)
+            };
         }
         now.is_stopping = command == Command::Stop;
         live.commands.send(command).map_err(|_| LiveError::NotUp)
@@ -251,7 +272,11 @@ impl Inner {
 
 impl LiveRun {
     fn is_up(&self) -> bool {
-        !lock(&self.now).has_ended && self.thread.as_ref().is_some_and(|thread| !thread.is_finished())
+        !lock(&self.now).has_ended
+            && self
+                .thread
+                .as_ref()
+                .is_some_and(|thread| !thread.is_finished())
     }
 }
 
@@ -262,6 +287,12 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 
 /// What a panic said.
 fn panic_text(panic: &(dyn Any + Send)) -> String {
-    let text = panic.downcast_ref::<String>().map(String::as_str).or(panic.downcast_ref::<&str>().copied());
-    format!("a bug in this program: {}", text.unwrap_or("it stopped without a word"))
+    let text = panic
+        .downcast_ref::<String>()
+        .map(String::as_str)
+        .or(panic.downcast_ref::<&str>().copied());
+    format!(
+        "a bug in this program: {}",
+        text.unwrap_or("it stopped without a word")
+    )
 }

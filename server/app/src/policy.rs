@@ -30,13 +30,24 @@ impl Policy {
     ///
     /// # Errors
     /// [`BadInput`] for a path that holds no checkpoint of this task.
-    pub fn open(task: &'static sim::tasks::Task, name: &str, noise: f64, seed: u64) -> anyhow::Result<Self> {
+    pub fn open(
+        task: &'static sim::tasks::Task,
+        name: &str,
+        noise: f64,
+        seed: u64,
+    ) -> anyhow::Result<Self> {
         let kind = match name {
             "expert" => Kind::Expert,
             "random" => Kind::Random,
             path => Kind::Trained(Box::new(trained(task, path)?)),
         };
-        Ok(Self { task, spec: (task.spec)(), kind, noise, seed })
+        Ok(Self {
+            task,
+            spec: (task.spec)(),
+            kind,
+            noise,
+            seed,
+        })
     }
 
     /// Actions `[n × A]` for states `[n × S]` at step `t` of their episodes.
@@ -44,13 +55,19 @@ impl Policy {
         let n = observations.len() / self.spec.observation_size;
         let mut rng = Rng::new(self.seed, Stream::Rollout, u64::from(t));
         let mut actions = match &self.kind {
-            Kind::Expert => observations.chunks(self.spec.observation_size).flat_map(|o| (self.task.expert)(o)).collect(),
-            Kind::Random => (0..n * self.spec.action_size).map(|_| rng.uniform_in(-1.0, 1.0) as f32).collect(),
+            Kind::Expert => observations
+                .chunks(self.spec.observation_size)
+                .flat_map(|o| (self.task.expert)(o))
+                .collect(),
+            Kind::Random => (0..n * self.spec.action_size)
+                .map(|_| rng.uniform_in(-1.0, 1.0) as f32)
+                .collect(),
             Kind::Trained(policy) => policy.act(observations),
         };
         if self.noise > 0.0 {
             for action in &mut actions {
-                *action = (action.clamp(-1.0, 1.0) + (self.noise * rng.normal()) as f32).clamp(-1.0, 1.0);
+                *action =
+                    (action.clamp(-1.0, 1.0) + (self.noise * rng.normal()) as f32).clamp(-1.0, 1.0);
             }
         }
         actions
@@ -59,11 +76,16 @@ impl Policy {
 
 fn trained(task: &sim::tasks::Task, path: &str) -> anyhow::Result<TrainedPolicy> {
     let policy = TrainedPolicy::open(Path::new(path)).map_err(|error| {
-        BadInput(format!("a policy is 'expert', 'random' or a checkpoint, and '{path}' is no checkpoint: {error}"))
+        BadInput(format!(
+            "a policy is 'expert', 'random' or a checkpoint, and '{path}' is no checkpoint: {error}"
+        ))
     })?;
     let trained_on = &policy.config().task;
     if trained_on != task.name {
-        let wrong = format!("the checkpoint {path} was trained on {trained_on}, not on {}", task.name);
+        let wrong = format!(
+            "the checkpoint {path} was trained on {trained_on}, not on {}",
+            task.name
+        );
         return Err(BadInput(wrong).into());
     }
     Ok(policy)

@@ -36,7 +36,12 @@ pub struct Problem {
 
 impl Problem {
     /// A problem of this kind; where and which request is filled in at the edge.
-    pub fn new(status: StatusCode, kind: &'static str, title: &'static str, detail: impl Into<String>) -> Self {
+    pub fn new(
+        status: StatusCode,
+        kind: &'static str,
+        title: &'static str,
+        detail: impl Into<String>,
+    ) -> Self {
         Self {
             r#type: kind,
             title,
@@ -51,52 +56,100 @@ impl Problem {
     /// 404: nothing lives at this address.
     pub fn no_such_page(path: &str) -> Self {
         let detail = format!("{path} is not an address of this server. The list of runs is at /.");
-        Self::new(StatusCode::NOT_FOUND, "/problems/no-such-page", "There is nothing here", detail)
+        Self::new(
+            StatusCode::NOT_FOUND,
+            "/problems/no-such-page",
+            "There is nothing here",
+            detail,
+        )
     }
 
     /// 405: the address takes other methods.
     pub fn wrong_method(path: &str) -> Self {
-        let detail = format!("{path} does not take this method; /api/v1/openapi.json says what it takes.");
-        Self::new(StatusCode::METHOD_NOT_ALLOWED, "/problems/wrong-method", "Not this way", detail)
+        let detail =
+            format!("{path} does not take this method; /api/v1/openapi.json says what it takes.");
+        Self::new(
+            StatusCode::METHOD_NOT_ALLOWED,
+            "/problems/wrong-method",
+            "Not this way",
+            detail,
+        )
     }
 
     /// 404: no run has this number.
     pub fn run_not_found(id: impl std::fmt::Display) -> Self {
         let detail = format!("There is no run {id}. The list of runs is at /.");
-        Self::new(StatusCode::NOT_FOUND, "/problems/run-not-found", "There is no such run", detail)
+        Self::new(
+            StatusCode::NOT_FOUND,
+            "/problems/run-not-found",
+            "There is no such run",
+            detail,
+        )
     }
 
     /// 401: nobody has said who answers.
     pub fn who_are_you() -> Self {
-        let detail = "Say who answers first: POST /api/v1/labelers with a name, or send a teacher token.";
-        Self::new(StatusCode::UNAUTHORIZED, "/problems/labeler-unknown", "Who is answering?", detail)
+        let detail =
+            "Say who answers first: POST /api/v1/labelers with a name, or send a teacher token.";
+        Self::new(
+            StatusCode::UNAUTHORIZED,
+            "/problems/labeler-unknown",
+            "Who is answering?",
+            detail,
+        )
     }
 
     /// 401: the server listens on more than its own machine, and the request brought no token.
     pub fn token_needed() -> Self {
         let detail = "This server needs a token: open /enter?token=… once, or send it as Authorization: Bearer.";
-        Self::new(StatusCode::UNAUTHORIZED, "/problems/token-needed", "This server needs a token", detail)
+        Self::new(
+            StatusCode::UNAUTHORIZED,
+            "/problems/token-needed",
+            "This server needs a token",
+            detail,
+        )
     }
 
     /// 403: the token is not for this.
     pub fn teachers_only() -> Self {
-        let detail = "Only a program with a teacher token of this run may do this; labelers never may.";
-        Self::new(StatusCode::FORBIDDEN, "/problems/teachers-only", "Not for labelers", detail)
+        let detail =
+            "Only a program with a teacher token of this run may do this; labelers never may.";
+        Self::new(
+            StatusCode::FORBIDDEN,
+            "/problems/teachers-only",
+            "Not for labelers",
+            detail,
+        )
     }
 
     /// 403: the request comes from another site.
     pub fn foreign(detail: impl Into<String>) -> Self {
-        Self::new(StatusCode::FORBIDDEN, "/problems/foreign-request", "Refused: it comes from elsewhere", detail)
+        Self::new(
+            StatusCode::FORBIDDEN,
+            "/problems/foreign-request",
+            "Refused: it comes from elsewhere",
+            detail,
+        )
     }
 
     /// 400 or 415 or 422: a body or parameter that is not what the address takes.
     pub fn bad_request(status: StatusCode, detail: impl Into<String>) -> Self {
-        Self::new(status, "/problems/bad-request", "The request cannot be read", detail)
+        Self::new(
+            status,
+            "/problems/bad-request",
+            "The request cannot be read",
+            detail,
+        )
     }
 
     /// 422: settings that cannot be used.
     pub fn unusable_settings(detail: impl Into<String>) -> Self {
-        Self::new(StatusCode::UNPROCESSABLE_ENTITY, "/problems/unusable-settings", "These settings cannot be used", detail)
+        Self::new(
+            StatusCode::UNPROCESSABLE_ENTITY,
+            "/problems/unusable-settings",
+            "These settings cannot be used",
+            detail,
+        )
     }
 
     /// 500: a page could not be written.
@@ -107,7 +160,12 @@ impl Problem {
     /// 500: a bug, or a machine in trouble; the log has the rest.
     pub fn internal() -> Self {
         let detail = "The server could not do it; its log says why, under the id of this request.";
-        Self::new(StatusCode::INTERNAL_SERVER_ERROR, "/problems/internal", "The server failed", detail)
+        Self::new(
+            StatusCode::INTERNAL_SERVER_ERROR,
+            "/problems/internal",
+            "The server failed",
+            detail,
+        )
     }
 }
 
@@ -116,7 +174,9 @@ impl IntoResponse for Problem {
         let status = StatusCode::from_u16(self.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
         let mut response = (status, Json(&self)).into_response();
         let content_type = header::HeaderValue::from_static("application/problem+json");
-        response.headers_mut().insert(header::CONTENT_TYPE, content_type);
+        response
+            .headers_mut()
+            .insert(header::CONTENT_TYPE, content_type);
         response.extensions_mut().insert(self);
         response
     }
@@ -128,14 +188,26 @@ impl From<StoreError> for Problem {
         let problem = |status, kind, title| Self::new(status, kind, title, detail.clone());
         match error {
             StoreError::Missing { what: "run", id } => Self::run_not_found(id),
-            StoreError::Missing { .. } => problem(StatusCode::NOT_FOUND, "/problems/not-found", "There is no such thing"),
-            StoreError::NotYours => problem(StatusCode::FORBIDDEN, "/problems/not-your-lease", "Not your lease"),
-            StoreError::WrongQuestion { .. } => {
-                problem(StatusCode::UNPROCESSABLE_ENTITY, "/problems/wrong-question", "Not an answer to this question")
-            }
-            StoreError::NoReason => {
-                problem(StatusCode::UNPROCESSABLE_ENTITY, "/problems/reason-needed", "A skip needs a reason")
-            }
+            StoreError::Missing { .. } => problem(
+                StatusCode::NOT_FOUND,
+                "/problems/not-found",
+                "There is no such thing",
+            ),
+            StoreError::NotYours => problem(
+                StatusCode::FORBIDDEN,
+                "/problems/not-your-lease",
+                "Not your lease",
+            ),
+            StoreError::WrongQuestion { .. } => problem(
+                StatusCode::UNPROCESSABLE_ENTITY,
+                "/problems/wrong-question",
+                "Not an answer to this question",
+            ),
+            StoreError::NoReason => problem(
+                StatusCode::UNPROCESSABLE_ENTITY,
+                "/problems/reason-needed",
+                "A skip needs a reason",
+            ),
             StoreError::NotSupersedable(_) => problem(
                 StatusCode::UNPROCESSABLE_ENTITY,
                 "/problems/not-supersedable",
@@ -146,19 +218,31 @@ impl From<StoreError> for Problem {
                     "answer_id": existing.id, "answer": existing.pressed, "sequence": existing.sequence,
                     "stored_at": rfc3339(existing.stored_at_ms),
                 })),
-                ..problem(StatusCode::CONFLICT, "/problems/already-answered", "Already answered differently")
+                ..problem(
+                    StatusCode::CONFLICT,
+                    "/problems/already-answered",
+                    "Already answered differently",
+                )
             },
-            StoreError::Taken => problem(StatusCode::GONE, "/problems/lease-taken", "Somebody else has this question now"),
+            StoreError::Taken => problem(
+                StatusCode::GONE,
+                "/problems/lease-taken",
+                "Somebody else has this question now",
+            ),
             StoreError::Rule(rule) if rule.contains("labeler_name_not_empty") => Self::bad_request(
                 StatusCode::UNPROCESSABLE_ENTITY,
                 "A name has at least one and at most 80 letters.",
             ),
-            StoreError::Full | StoreError::ReadOnly => {
-                problem(StatusCode::INSUFFICIENT_STORAGE, "/problems/storage", "The answer could not be stored")
-            }
-            StoreError::Closed => {
-                problem(StatusCode::SERVICE_UNAVAILABLE, "/problems/closing", "The server is closing")
-            }
+            StoreError::Full | StoreError::ReadOnly => problem(
+                StatusCode::INSUFFICIENT_STORAGE,
+                "/problems/storage",
+                "The answer could not be stored",
+            ),
+            StoreError::Closed => problem(
+                StatusCode::SERVICE_UNAVAILABLE,
+                "/problems/closing",
+                "The server is closing",
+            ),
             other => {
                 tracing::error!("{other}");
                 Self::internal()
@@ -172,14 +256,22 @@ impl From<LiveError> for Problem {
         let detail = error.to_string();
         match error {
             LiveError::Store(error) => error.into(),
-            LiveError::Closing => {
-                Self::new(StatusCode::SERVICE_UNAVAILABLE, "/problems/closing", "The server is closing", detail)
-            }
+            LiveError::Closing => Self::new(
+                StatusCode::SERVICE_UNAVAILABLE,
+                "/problems/closing",
+                "The server is closing",
+                detail,
+            ),
             LiveError::Thread(_) => {
                 tracing::error!("{detail}");
                 Self::internal()
             }
-            _ => Self::new(StatusCode::CONFLICT, "/problems/run-state", "The run cannot do that now", detail),
+            _ => Self::new(
+                StatusCode::CONFLICT,
+                "/problems/run-state",
+                "The run cannot do that now",
+                detail,
+            ),
         }
     }
 }

@@ -24,7 +24,10 @@ pub fn router(state: AppState) -> Router {
         .route("/", get(pages::home::page))
         .route("/runs", post(pages::home::start))
         .route("/runs/{id}", get(pages::run::page))
-        .route("/runs/{id}/label", get(pages::label::page).post(pages::label::sign_in))
+        .route(
+            "/runs/{id}/label",
+            get(pages::label::page).post(pages::label::sign_in),
+        )
         .route("/runs/{id}/pause", post(pages::run::pause))
         .route("/runs/{id}/resume", post(pages::run::resume))
         .route("/runs/{id}/stop", post(pages::run::stop))
@@ -62,6 +65,9 @@ fn api() -> Router<AppState> {
         .route("/api/v1/runs/{id}/clips", get(clips::of_run))
         .route("/api/v1/leases/{id}/heartbeat", post(leases::heartbeat))
         .route("/api/v1/leases/{id}/answer", put(leases::answer))
-        .route("/api/v1/queries/{id}/task-rewards", get(queries::task_rewards))
+        .route(
+            "/api/v1/queries/{id}/task-rewards",
+            get(queries::task_rewards),
+        )
         .route("/api/v1/clips/{name}", get(clips::file))
 }

@@ -23,7 +23,11 @@ pub struct Inner {
 impl AppState {
     /// The state of a server.
     pub fn new(store: Store, live: Live, needs_token: bool) -> Self {
-        Self(Arc::new(Inner { store, live, needs_token }))
+        Self(Arc::new(Inner {
+            store,
+            live,
+            needs_token,
+        }))
     }
 }
 

@@ -21,21 +21,34 @@ use crate::state::AppState;
 #[utoipa::path(get, path = "/api/v1/clips/{name}", tag = "clips",
     params(("name" = String, Path, description = "64 hexadecimal digits and .mp4")),
     responses((status = 200, content_type = "video/mp4"), (status = 206, content_type = "video/mp4"), (status = 404, body = Problem)))]
-pub async fn file(State(app): State<AppState>, Path(name): Path<String>, request: Request) -> Result<Response, Problem> {
+pub async fn file(
+    State(app): State<AppState>,
+    Path(name): Path<String>,
+    request: Request,
+) -> Result<Response, Problem> {
     let sha256 = name.strip_suffix(".mp4").unwrap_or(&name);
     let (clip, path) = app.store.clip(sha256).await?;
-    let tag = HeaderValue::from_str(&format!("\"{}\"", clip.sha256)).map_err(|_| Problem::internal())?;
+    let tag =
+        HeaderValue::from_str(&format!("\"{}\"", clip.sha256)).map_err(|_| Problem::internal())?;
     if request.headers().get(header::IF_NONE_MATCH) == Some(&tag) {
         return Ok((axum::http::StatusCode::NOT_MODIFIED, [(header::ETAG, tag)]).into_response());
     }
     let Ok(served) = ServeFile::new(path).oneshot(request).await;
     let mut response = served.into_response();
-    if response.status().is_client_error() && response.status() != axum::http::StatusCode::RANGE_NOT_SATISFIABLE {
-        tracing::error!("the bytes of clip {} are gone from the data folder", clip.sha256);
+    if response.status().is_client_error()
+        && response.status() != axum::http::StatusCode::RANGE_NOT_SATISFIABLE
+    {
+        tracing::error!(
+            "the bytes of clip {} are gone from the data folder",
+            clip.sha256
+        );
         return Err(Problem::internal());
     }
     let headers = response.headers_mut();
-    headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("private, max-age=31536000, immutable"));
+    headers.insert(
+        header::CACHE_CONTROL,
+        HeaderValue::from_static("private, max-age=31536000, immutable"),
+    );
     headers.insert(header::CONTENT_TYPE, HeaderValue::from_static("video/mp4"));
     headers.insert(header::ETAG, tag);
     headers.remove(header::LAST_MODIFIED);
@@ -106,20 +119,42 @@ pub struct BadView {
 /// An unknown run.
 #[utoipa::path(get, path = "/api/v1/runs/{id}/clips", tag = "clips", params(("id" = i64, Path)),
     responses((status = 200, body = ClipsView), (status = 404, body = Problem)))]
-pub async fn of_run(State(app): State<AppState>, Run(run): Run) -> Result<Json<ClipsView>, Problem> {
-    let pairs = app.store.newest_pairs(run.id, 12).await?.into_iter().map(pair_view).collect();
-    let demonstrations = app.store.demonstrations(run.id).await?.into_iter().map(|row| DemonstrationView {
-        session: row.shows.session,
-        step: row.shows.step,
-        success: row.shows.success,
-        task_return: row.shows.task_return,
-        clip: address(&row.clip),
-        n_frames: row.n_frames,
-        fps: row.fps,
-    });
+pub async fn of_run(
+    State(app): State<AppState>,
+    Run(run): Run,
+) -> Result<Json<ClipsView>, Problem> {
+    let pairs = app
+        .store
+        .newest_pairs(run.id, 12)
+        .await?
+        .into_iter()
+        .map(pair_view)
+        .collect();
+    let demonstrations = app
+        .store
+        .demonstrations(run.id)
+        .await?
+        .into_iter()
+        .map(|row| DemonstrationView {
+            session: row.shows.session,
+            step: row.shows.step,
+            success: row.shows.success,
+            task_return: row.shows.task_return,
+            clip: address(&row.clip),
+            n_frames: row.n_frames,
+            fps: row.fps,
+        });
     let bad = app.store.bad_queries(run.id).await?.into_iter();
-    let bad = bad.map(|row| BadView { query_id: row.query.0, session: row.session, trouble: row.trouble });
-    Ok(Json(ClipsView { pairs, demonstrations: demonstrations.collect(), bad: bad.collect() }))
+    let bad = bad.map(|row| BadView {
+        query_id: row.query.0,
+        session: row.session,
+        trouble: row.trouble,
+    });
+    Ok(Json(ClipsView {
+        pairs,
+        demonstrations: demonstrations.collect(),
+        bad: bad.collect(),
+    }))
 }
 
 fn pair_view(pair: AnsweredPair) -> PairView {

@@ -18,7 +18,13 @@ use crate::problem::Problem;
 use crate::state::AppState;
 
 /// Kinds of event that draw curves.
-const CURVES: &[&str] = &["metrics", "session_offered", "session_closed", "evaluation", "finished"];
+const CURVES: &[&str] = &[
+    "metrics",
+    "session_offered",
+    "session_closed",
+    "evaluation",
+    "finished",
+];
 /// Events read at once.
 const PAGE: u32 = 500;
 
@@ -30,10 +36,15 @@ const PAGE: u32 = 500;
 #[utoipa::path(get, path = "/api/v1/runs/{id}/events", tag = "events", params(("id" = i64, Path)),
     responses((status = 200, content_type = "text/event-stream"), (status = 404, body = Problem)))]
 pub async fn follow(State(app): State<AppState>, Run(run): Run, headers: HeaderMap) -> Response {
-    let last = headers.get("last-event-id").and_then(|id| id.to_str().ok()).and_then(|id| id.parse().ok());
+    let last = headers
+        .get("last-event-id")
+        .and_then(|id| id.to_str().ok())
+        .and_then(|id| id.parse().ok());
     let (sender, events) = tokio::sync::mpsc::channel(64);
     tokio::spawn(feed(app, run.id, last.unwrap_or(0), sender));
-    Sse::new(ReceiverStream::new(events)).keep_alive(KeepAlive::new().interval(Duration::from_secs(15))).into_response()
+    Sse::new(ReceiverStream::new(events))
+        .keep_alive(KeepAlive::new().interval(Duration::from_secs(15)))
+        .into_response()
 }
 
 /// Ends when the reader goes away.
@@ -78,10 +89,15 @@ async fn send_log(
 ) -> Result<Option<u64>, store::StoreError> {
     loop {
         let page = store.events_after(run, after, PAGE).await?;
-        let Some(EventRow { id, .. }) = page.last() else { return Ok(Some(after)) };
+        let Some(EventRow { id, .. }) = page.last() else {
+            return Ok(Some(after));
+        };
         after = *id;
         for row in page {
-            let event = Event::default().id(row.id.to_string()).event(row.kind).data(row.data);
+            let event = Event::default()
+                .id(row.id.to_string())
+                .event(row.kind)
+                .data(row.data);
             if out.send(Ok(event)).await.is_err() {
                 return Ok(None);
             }

@@ -33,11 +33,22 @@ pub async fn metrics(State(app): State<AppState>) -> Result<Response, Problem> {
     use std::fmt::Write as _;
     let mut text = String::from("# TYPE stair_http_requests_total counter\n");
     let _ = writeln!(text, "stair_http_requests_total {}", guard::n_requests()); // a string takes all
-    for (name, what) in [("stair_run_step", "environment steps taken"), ("stair_run_labels", "answers, skips not counted")] {
+    for (name, what) in [
+        ("stair_run_step", "environment steps taken"),
+        ("stair_run_labels", "answers, skips not counted"),
+    ] {
         let _ = writeln!(text, "# HELP {name} {what}\n# TYPE {name} gauge"); // the same
         for run in app.store.runs().await? {
-            let value = if name == "stair_run_step" { run.step } else { u64::from(run.n_labels) };
-            let _ = writeln!(text, "{name}{{run=\"{}\",state=\"{}\"}} {value}", run.id, run.state.kind); // the same
+            let value = if name == "stair_run_step" {
+                run.step
+            } else {
+                u64::from(run.n_labels)
+            };
+            let _ = writeln!(
+                text,
+                "{name}{{run=\"{}\",state=\"{}\"}} {value}",
+                run.id, run.state.kind
+            ); // the same
         }
     }
     Ok(([(header::CONTENT_TYPE, "text/plain; version=0.0.4")], text).into_response())

@@ -35,9 +35,17 @@ pub struct LabelerView {
 /// A name that is none.
 #[utoipa::path(post, path = "/api/v1/labelers", tag = "labelers", request_body = NewLabeler,
     responses((status = 201, body = LabelerView), (status = 422, body = Problem)))]
-pub async fn create(State(app): State<AppState>, Body(new): Body<NewLabeler>) -> Result<Response, Problem> {
+pub async fn create(
+    State(app): State<AppState>,
+    Body(new): Body<NewLabeler>,
+) -> Result<Response, Problem> {
     let (cookie, view) = sign_in(&app, &new.name).await?;
-    Ok((StatusCode::CREATED, [(header::SET_COOKIE, cookie)], Json(view)).into_response())
+    Ok((
+        StatusCode::CREATED,
+        [(header::SET_COOKIE, cookie)],
+        Json(view),
+    )
+        .into_response())
 }
 
 /// The cookie for a browser whose labeler has this name.
@@ -46,7 +54,10 @@ pub async fn create(State(app): State<AppState>, Body(new): Body<NewLabeler>) ->
 /// A name that is none.
 pub async fn sign_in(app: &AppState, name: &str) -> Result<(String, LabelerView), Problem> {
     let (labeler, secret) = app.store.sign_in(name).await?;
-    let view = LabelerView { id: labeler.id.0, name: labeler.name };
+    let view = LabelerView {
+        id: labeler.id.0,
+        name: labeler.name,
+    };
     Ok((set_cookie(LABELER_COOKIE, &secret), view))
 }
 
@@ -60,12 +71,17 @@ pub struct Entrance {
 ///
 /// # Errors
 /// A token that was never given out.
-pub async fn enter(State(app): State<AppState>, Query(entrance): Query<Entrance>) -> Result<Response, Problem> {
+pub async fn enter(
+    State(app): State<AppState>,
+    Query(entrance): Query<Entrance>,
+) -> Result<Response, Problem> {
     let secret = Secret::brought(entrance.token);
     match app.store.bearer(&secret).await? {
-        Some(bearer) if bearer.kind == TokenKind::Access => {
-            Ok(([(header::SET_COOKIE, set_cookie(ACCESS_COOKIE, &secret))], Redirect::to("/")).into_response())
-        }
+        Some(bearer) if bearer.kind == TokenKind::Access => Ok((
+            [(header::SET_COOKIE, set_cookie(ACCESS_COOKIE, &secret))],
+            Redirect::to("/"),
+        )
+            .into_response()),
         _ => Err(Problem::token_needed()),
     }
 }

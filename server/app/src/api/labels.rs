@@ -37,17 +37,26 @@ pub async fn export(
         Some("jsonl") => ("application/x-ndjson", "jsonl", json_lines(&labels)),
         Some(other) => {
             let detail = format!("There is no format '{other}'; there are csv and jsonl.");
-            return Err(Problem::bad_request(StatusCode::UNPROCESSABLE_ENTITY, detail));
+            return Err(Problem::bad_request(
+                StatusCode::UNPROCESSABLE_ENTITY,
+                detail,
+            ));
         }
     };
     let name = format!("attachment; filename=\"labels-{}.{extension}\"", run.id);
-    let headers = [(header::CONTENT_TYPE, content_type.to_owned()), (header::CONTENT_DISPOSITION, name)];
+    let headers = [
+        (header::CONTENT_TYPE, content_type.to_owned()),
+        (header::CONTENT_DISPOSITION, name),
+    ];
     Ok((headers, Body::from(text)).into_response())
 }
 
 /// One object a line.
 pub fn json_lines(labels: &[Label]) -> String {
-    labels.iter().filter_map(|label| serde_json::to_string(label).ok()).fold(String::new(), |text, line| text + &line + "\n")
+    labels
+        .iter()
+        .filter_map(|label| serde_json::to_string(label).ok())
+        .fold(String::new(), |text, line| text + &line + "\n")
 }
 
 /// RFC 4180 with a header line; a value that does not exist is empty.
@@ -71,7 +80,11 @@ fn cell(value: &Value) -> String {
         Value::String(text) => text.clone(),
         other => other.to_string(),
     };
-    if text.contains([',', '"', '\n', '\r']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text }
+    if text.contains([',', '"', '\n', '\r']) {
+        format!("\"{}\"", text.replace('"', "\"\""))
+    } else {
+        text
+    }
 }
 
 #[cfg(test)]
@@ -80,7 +93,10 @@ mod tests {
 
     #[test]
     fn a_reason_with_commas_and_quotes_stays_one_cell() {
-        assert_eq!(cell(&Value::from("left, \"or\" right")), "\"left, \"\"or\"\" right\"");
+        assert_eq!(
+            cell(&Value::from("left, \"or\" right")),
+            "\"left, \"\"or\"\" right\""
+        );
         assert_eq!(cell(&Value::Null), "");
         assert_eq!(cell(&Value::from(3)), "3");
     }

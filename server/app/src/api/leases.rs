@@ -127,12 +127,19 @@ pub async fn create(
     let count = request.count.min(MOST[usize::from(!is_person)]);
     let is_open = !matches!(run.state.kind.as_str(), "paused" | "failed" | "stopped");
     let count = if is_open { count } else { 0 };
-    let leases = app.store.lease(run.id, who.labeler.id, count, is_person, now_ms()).await?;
+    let leases = app
+        .store
+        .lease(run.id, who.labeler.id, count, is_person, now_ms())
+        .await?;
     let queue = app.store.queue(run.id, who.labeler.id).await?;
     let progress = app.store.progress(run.id).await?;
     let state = queue_view(&app, &run, !leases.is_empty(), queue, progress);
     let progress = progress_view(progress);
-    Ok(Json(LeasesView { leases: leases.into_iter().map(lease_view).collect(), state, progress }))
+    Ok(Json(LeasesView {
+        leases: leases.into_iter().map(lease_view).collect(),
+        state,
+        progress,
+    }))
 }
 
 /// Keeps a lease for another ten minutes.
@@ -146,8 +153,13 @@ pub async fn heartbeat(
     who: Answerer,
     Path(lease): Path<String>,
 ) -> Result<Json<HeartbeatView>, Problem> {
-    let until = app.store.heartbeat(&lease, who.labeler.id, now_ms()).await?;
-    Ok(Json(HeartbeatView { expires_at: rfc3339(until) }))
+    let until = app
+        .store
+        .heartbeat(&lease, who.labeler.id, now_ms())
+        .await?;
+    Ok(Json(HeartbeatView {
+        expires_at: rfc3339(until),
+    }))
 }
 
 /// A lease that goes on.
@@ -223,17 +235,30 @@ pub async fn answer(
     Path(lease): Path<String>,
     Body(request): Body<AnswerRequest>,
 ) -> Result<Response, Problem> {
-    let stored = app.store.answer(&lease, who.labeler.id, request.into_answer()).await?;
-    let status = if stored.is_new { StatusCode::CREATED } else { StatusCode::OK };
-    let view =
-        AnswerView { answer_id: stored.id, sequence: stored.sequence, stored_at: rfc3339(stored.stored_at_ms) };
+    let stored = app
+        .store
+        .answer(&lease, who.labeler.id, request.into_answer())
+        .await?;
+    let status = if stored.is_new {
+        StatusCode::CREATED
+    } else {
+        StatusCode::OK
+    };
+    let view = AnswerView {
+        answer_id: stored.id,
+        sequence: stored.sequence,
+        stored_at: rfc3339(stored.stored_at_ms),
+    };
     Ok((status, Json(view)).into_response())
 }
 
 impl AnswerRequest {
     fn into_answer(self) -> NewAnswer {
         let timing = self.timing.unwrap_or_default();
-        let whole = |ms: Option<f64>| ms.filter(|ms| ms.is_finite()).map(|ms| ms.clamp(0.0, f64::from(u32::MAX)) as u32);
+        let whole = |ms: Option<f64>| {
+            ms.filter(|ms| ms.is_finite())
+                .map(|ms| ms.clamp(0.0, f64::from(u32::MAX)) as u32)
+        };
         NewAnswer {
             pressed: self.answer,
             reason: self.reason,
@@ -265,35 +290,65 @@ fn lease_view(lease: Lease) -> LeaseView {
 
 fn clip_view(clip: Option<LeaseClip>) -> ClipView {
     match clip {
-        Some(clip) => {
-            ClipView { clip: Some(format!("/api/v1/clips/{}.mp4", clip.sha256)), n_frames: clip.n_frames, fps: clip.fps }
-        }
-        None => ClipView { clip: None, n_frames: 0, fps: 0 },
+        Some(clip) => ClipView {
+            clip: Some(format!("/api/v1/clips/{}.mp4", clip.sha256)),
+            n_frames: clip.n_frames,
+            fps: clip.fps,
+        },
+        None => ClipView {
+            clip: None,
+            n_frames: 0,
+            fps: 0,
+        },
     }
 }
 
 /// Different words for different reasons to wait.
-fn queue_view(app: &AppState, run: &RunRow, has_leases: bool, queue: Queue, progress: Progress) -> QueueView {
+fn queue_view(
+    app: &AppState,
+    run: &RunRow,
+    has_leases: bool,
+    queue: Queue,
+    progress: Progress,
+) -> QueueView {
     let phase = app.live.phase(run.id).map(phase_view);
-    let view = |kind, message: &str, until| QueueView { kind, message: message.to_owned(), until, phase };
-    let line = app.live.state(run.id).map_or_else(|| run.state.message.clone(), |line| line.message);
+    let view = |kind, message: &str, until| QueueView {
+        kind,
+        message: message.to_owned(),
+        until,
+        phase,
+    };
+    let line = app
+        .live
+        .state(run.id)
+        .map_or_else(|| run.state.message.clone(), |line| line.message);
     match run.state.kind.as_str() {
         "failed" => view("failed", &line, None),
         "paused" => view("paused", "Paused by the researcher.", None),
-        "stopped" => view("paused", "Stopped by the researcher; it can be resumed.", None),
+        "stopped" => view(
+            "paused",
+            "Stopped by the researcher; it can be resumed.",
+            None,
+        ),
         _ if has_leases => view("open", "Questions are waiting for you.", None),
         "finished" => view("done", "The agent is trained. Thank you!", None),
         _ if queue.n_drawing > 0 => match app.live.clip_trouble() {
-            Some(trouble) => view("drawing", &format!("Clips cannot be drawn: {trouble}"), None),
+            Some(trouble) => view(
+                "drawing",
+                &format!("Clips cannot be drawn: {trouble}"),
+                None,
+            ),
             None => view("drawing", "The next clips are being drawn.", None),
         },
         _ if queue.n_held > 0 => {
             let message = "Other labelers hold the questions that are left.";
             view("held", message, queue.held_until_ms.map(rfc3339))
         }
-        _ if progress.answered >= progress.budget => {
-            view("done", "All questions of this run are answered. Thank you!", None)
-        }
+        _ if progress.answered >= progress.budget => view(
+            "done",
+            "All questions of this run are answered. Thank you!",
+            None,
+        ),
         _ if !run.is_trained => view("done", "All questions are answered. Thank you!", None),
         _ => view("waiting", &line, None),
     }

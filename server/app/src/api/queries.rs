@@ -40,16 +40,29 @@ pub async fn task_rewards(
     who: Answerer,
     Path(query): Path<i64>,
 ) -> Result<Json<TaskRewardsView>, Problem> {
-    let Some(taught) = who.teaches else { return Err(Problem::teachers_only()) };
+    let Some(taught) = who.teaches else {
+        return Err(Problem::teachers_only());
+    };
     let truth = app.store.task_rewards(QueryId(query)).await?;
     if truth.run != taught {
         return Err(Problem::teachers_only());
     }
-    let left_is = app.store.left_for(QueryId(query), who.labeler.id).await?.unwrap_or(Which::First);
+    let left_is = app
+        .store
+        .left_for(QueryId(query), who.labeler.id)
+        .await?
+        .unwrap_or(Which::First);
     let (left, right) = match left_is {
         Which::First => (truth.first, truth.second),
         Which::Second => (truth.second, truth.first),
     };
     let (session, index) = (truth.key.session, truth.key.index);
-    Ok(Json(TaskRewardsView { session, index, left, right, left_is, same_stage: truth.same_stage }))
+    Ok(Json(TaskRewardsView {
+        session,
+        index,
+        left,
+        right,
+        left_is,
+        same_stage: truth.same_stage,
+    }))
 }

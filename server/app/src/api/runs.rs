@@ -102,9 +102,16 @@ pub async fn list(State(app): State<AppState>) -> Result<Json<Vec<RunView>>, Pro
 /// An unknown task, method, preset, teacher or setting, with the nearest right name.
 #[utoipa::path(post, path = "/api/v1/runs", tag = "runs", request_body = RunRequest,
     responses((status = 201, body = RunView), (status = 422, body = Problem)))]
-pub async fn create(State(app): State<AppState>, Body(request): Body<RunRequest>) -> Result<Response, Problem> {
+pub async fn create(
+    State(app): State<AppState>,
+    Body(request): Body<RunRequest>,
+) -> Result<Response, Problem> {
     let id = start(&app, request).await?;
-    let run = app.store.run(id).await?.ok_or_else(|| Problem::run_not_found(id))?;
+    let run = app
+        .store
+        .run(id)
+        .await?
+        .ok_or_else(|| Problem::run_not_found(id))?;
     let location = [(header::LOCATION, format!("/api/v1/runs/{id}"))];
     Ok((StatusCode::CREATED, location, Json(view(&app, run).await?)).into_response())
 }
@@ -152,7 +159,12 @@ pub fn check_resumable(run: &RunRow) -> Result<(), Problem> {
         (_, "finished") => "The run has taken all its steps.",
         _ => return Ok(()),
     };
-    Err(Problem::new(StatusCode::CONFLICT, "/problems/run-state", "The run cannot do that now", why_not))
+    Err(Problem::new(
+        StatusCode::CONFLICT,
+        "/problems/run-state",
+        "The run cannot do that now",
+        why_not,
+    ))
 }
 
 /// Ends a run's thread after a checkpoint; it can be taken up again.
@@ -196,7 +208,13 @@ pub async fn create_token(
         return Err(Problem::teachers_only());
     }
     let secret = app.store.add_teacher_token(run.id).await?;
-    Ok((StatusCode::CREATED, Json(TokenView { token: secret.reveal().to_owned() })).into_response())
+    Ok((
+        StatusCode::CREATED,
+        Json(TokenView {
+            token: secret.reveal().to_owned(),
+        }),
+    )
+        .into_response())
 }
 
 /// Resolves the settings, keeps the run, and starts its thread.
@@ -205,11 +223,16 @@ pub async fn create_token(
 /// An unknown task, method, preset, teacher or setting.
 pub async fn start(app: &AppState, request: RunRequest) -> Result<RunId, Problem> {
     let teacher = request.teacher.unwrap_or_else(|| "human".into());
-    let scripted: Vec<&str> = domain::teacher::SCRIPTED.iter().map(|(name, _)| *name).collect();
+    let scripted: Vec<&str> = domain::teacher::SCRIPTED
+        .iter()
+        .map(|(name, _)| *name)
+        .collect();
     let is_answered_outside = matches!(teacher.as_str(), "human" | "http");
     if !is_answered_outside && !scripted.contains(&teacher.as_str()) {
         let known = format!("human, http, {}", scripted.join(", "));
-        return Err(Problem::unusable_settings(format!("there is no teacher '{teacher}'; known: {known}")));
+        return Err(Problem::unusable_settings(format!(
+            "there is no teacher '{teacher}'; known: {known}"
+        )));
     }
     let mut overrides = Vec::new();
     flatten("", &request.settings, &mut overrides);
@@ -243,7 +266,11 @@ pub async fn start(app: &AppState, request: RunRequest) -> Result<RunId, Problem
 /// `{"a": {"b": 1}}` and `{"a.b": 1}` alike become `a.b=1`, as on the command line.
 fn flatten(prefix: &str, settings: &Map<String, Value>, overrides: &mut Vec<String>) {
     for (key, value) in settings {
-        let path = if prefix.is_empty() { key.clone() } else { format!("{prefix}.{key}") };
+        let path = if prefix.is_empty() {
+            key.clone()
+        } else {
+            format!("{prefix}.{key}")
+        };
         match value {
             Value::Object(inner) => flatten(&path, inner, overrides),
             other => overrides.push(format!("{path}={other}")),
@@ -259,7 +286,9 @@ pub async fn view(app: &AppState, run: RunRow) -> Result<RunView, Problem> {
     let progress = app.store.progress(run.id).await?;
     let line = app.live.state(run.id);
     let step = app.live.phase(run.id).map_or(run.step, |phase| phase.step);
-    let (message, next) = line.map_or((run.state.message, run.state.next), |line| (line.message, line.next));
+    let (message, next) = line.map_or((run.state.message, run.state.next), |line| {
+        (line.message, line.next)
+    });
     Ok(RunView {
         id: run.id.0,
         task: run.task,
@@ -267,7 +296,12 @@ pub async fn view(app: &AppState, run: RunRow) -> Result<RunView, Problem> {
         preset: run.preset,
         seed: run.seed,
         teacher: run.teacher,
-        state: StateView { kind: run.state.kind, message, since: rfc3339(run.state.since_ms), next },
+        state: StateView {
+            kind: run.state.kind,
+            message,
+            since: rfc3339(run.state.since_ms),
+            next,
+        },
         step,
         total_steps: run.total_steps,
         labels: progress.answered,

@@ -29,8 +29,18 @@ pub struct Named {
 pub async fn list() -> Json<Registry> {
     let named = |(name, summary)| Named { name, summary };
     Json(Registry {
-        tasks: sim::tasks::tasks().iter().map(|task| named((task.name, task.summary))).collect(),
-        methods: lab::method::METHODS.iter().map(|method| named((method.name, method.summary))).collect(),
-        teachers: domain::teacher::SCRIPTED.iter().copied().map(named).collect(),
+        tasks: sim::tasks::tasks()
+            .iter()
+            .map(|task| named((task.name, task.summary)))
+            .collect(),
+        methods: lab::method::METHODS
+            .iter()
+            .map(|method| named((method.name, method.summary)))
+            .collect(),
+        teachers: domain::teacher::SCRIPTED
+            .iter()
+            .copied()
+            .map(named)
+            .collect(),
     })
 }

@@ -45,8 +45,14 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     let task = find_task(&args.task).map_err(BadInput::from_error)?;
     let policy = Policy::open(task, &args.policy, args.noise, args.seed)?;
-    let trial = evaluate(task, args.episodes, args.seed, &mut |observations, t| policy.act(observations, t))?;
-    let (success, mean, std) = (trial.success_rate(), trial.return_mean(), trial.return_std());
+    let trial = evaluate(task, args.episodes, args.seed, &mut |observations, t| {
+        policy.act(observations, t)
+    })?;
+    let (success, mean, std) = (
+        trial.success_rate(),
+        trial.return_mean(),
+        trial.return_std(),
+    );
     let median = trial.first_success_median();
     if args.json {
         println!(

@@ -18,6 +18,11 @@ pub struct Args {}
 /// # Errors
 /// A description that cannot be written as JSON.
 pub fn run(_args: &Args) -> anyhow::Result<ExitCode> {
-    println!("{}", Document::openapi().to_pretty_json().context("cannot write the description")?);
+    println!(
+        "{}",
+        Document::openapi()
+            .to_pretty_json()
+            .context("cannot write the description")?
+    );
     Ok(ExitCode::SUCCESS)
 }

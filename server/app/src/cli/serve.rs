@@ -33,7 +33,12 @@ pub struct Args {
     #[arg(long, default_value = "data", value_name = "DIR")]
     data: PathBuf,
     /// The token that others must bring when --bind is more than this machine
-    #[arg(long, env = "STAIR_TOKEN", hide_env_values = true, value_name = "SECRET")]
+    #[arg(
+        long,
+        env = "STAIR_TOKEN",
+        hide_env_values = true,
+        value_name = "SECRET"
+    )]
     token: Option<String>,
     /// Make a token and print it, once
     #[arg(long, conflicts_with = "token")]
@@ -47,8 +52,13 @@ pub struct Args {
 /// server or a newer version holds; anything that stops the server later.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let filter = tracing_subscriber::EnvFilter::try_from_default_env();
-    let filter = filter.unwrap_or_else(|_| "info,sqlx=warn,wgpu=error,naga=error,wgpu_hal=off,wgpu_core=error".into());
-    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
+    let filter = filter.unwrap_or_else(|_| {
+        "info,sqlx=warn,wgpu=error,naga=error,wgpu_hal=off,wgpu_core=error".into()
+    });
+    tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(std::io::stderr)
+        .init();
     let runtime = tokio::runtime::Runtime::new().context("cannot start the server's threads")?;
     runtime.block_on(serve(args))?;
     Ok(ExitCode::SUCCESS)
@@ -56,12 +66,18 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 
 async fn serve(args: Args) -> anyhow::Result<()> {
     let token = token(&args)?;
-    let store = Store::open(&args.data).await.map_err(BadInput::from_error)?;
+    let store = Store::open(&args.data)
+        .await
+        .map_err(BadInput::from_error)?;
     if let Some(token) = &token {
         store.add_access_token(token).await?;
     }
-    let listener = TcpListener::bind(args.bind).await.map_err(|error| cannot_listen(args.bind, &error))?;
-    let address = listener.local_addr().context("cannot read the server's address")?;
+    let listener = TcpListener::bind(args.bind)
+        .await
+        .map_err(|error| cannot_listen(args.bind, &error))?;
+    let address = listener
+        .local_addr()
+        .context("cannot read the server's address")?;
     let live = Live::start(store.clone()).await?;
     let router = router(AppState::new(store, live.clone(), token.is_some()));
     announce(&args, address, token.as_ref());
@@ -72,7 +88,11 @@ async fn serve(args: Args) -> anyhow::Result<()> {
         tracing::info!("stopping: runs leave a checkpoint and go on at the next start");
         let _ = closing.send(true); // nobody else listens when the server has failed already
     };
-    let mut serving = tokio::spawn(axum::serve(listener, router).with_graceful_shutdown(until_told).into_future());
+    let mut serving = tokio::spawn(
+        axum::serve(listener, router)
+            .with_graceful_shutdown(until_told)
+            .into_future(),
+    );
     let ended = tokio::select! {
         ended = &mut serving => Some(ended),
         _ = closed.wait_for(|is_closing| *is_closing) => None,
@@ -81,9 +101,13 @@ async fn serve(args: Args) -> anyhow::Result<()> {
     let ended = match ended {
         Some(ended) => ended,
         // Streams of events never end by themselves, so the wait for requests in hand has an end.
-        None => tokio::time::timeout(GRACE, serving).await.unwrap_or(Ok(Ok(()))),
+        None => tokio::time::timeout(GRACE, serving)
+            .await
+            .unwrap_or(Ok(Ok(()))),
     };
-    ended.context("the server stopped")?.context("the server stopped")
+    ended
+        .context("the server stopped")?
+        .context("the server stopped")
 }
 
 /// The secret that others must bring; none is needed where nobody else can come.
@@ -93,7 +117,10 @@ fn token(args: &Args) -> anyhow::Result<Option<Secret>> {
     }
     if let Some(token) = &args.token {
         if token.trim().len() < 16 {
-            return Err(BadInput("the token is too easy to guess: use at least 16 characters, or --new-token".into()).into());
+            return Err(BadInput(
+                "the token is too easy to guess: use at least 16 characters, or --new-token".into(),
+            )
+            .into());
         }
         return Ok(Some(Secret::brought(token.trim())));
     }
@@ -111,7 +138,10 @@ fn cannot_listen(address: SocketAddr, error: &std::io::Error) -> anyhow::Error {
     let told = match error.kind() {
         std::io::ErrorKind::AddrInUse => {
             let other = SocketAddr::new(address.ip(), address.port().wrapping_add(1));
-            format!("port {} is in use; stop the other program, or choose another: --bind {other}", address.port())
+            format!(
+                "port {} is in use; stop the other program, or choose another: --bind {other}",
+                address.port()
+            )
         }
         _ => format!("cannot listen on {address}: {error}"),
     };
@@ -128,7 +158,10 @@ fn announce(args: &Args, address: SocketAddr, token: Option<&Secret>) {
         Some(_) => println!("Open http://{address}/enter?token=… with your token"),
         None => println!("Open http://{address}"),
     }
-    println!("Data is kept in {}. Ctrl-C stops; runs go on at the next start.", args.data.display());
+    println!(
+        "Data is kept in {}. Ctrl-C stops; runs go on at the next start.",
+        args.data.display()
+    );
 }
 
 async fn told_to_stop() {

@@ -122,7 +122,13 @@ fn open(args: &Args) -> anyhow::Result<(Run, PathBuf)> {
         return Ok((run, folder.clone()));
     }
     let config = RunConfig::resolve(&layers(args)?).map_err(BadInput::from_error)?;
-    let named = || format!("data/train/{}-{}-{}", config.task, config.method, config.seed).into();
+    let named = || {
+        format!(
+            "data/train/{}-{}-{}",
+            config.task, config.method, config.seed
+        )
+        .into()
+    };
     let folder = args.out.clone().unwrap_or_else(named);
     let run = Run::start(config, &folder).map_err(BadInput::from_error)?;
     Ok((run, folder))
@@ -139,10 +145,26 @@ fn layers(args: &Args) -> anyhow::Result<Layers> {
     };
     let mut overrides = args.settings.clone();
     overrides.extend(args.seed.map(|seed| format!("seed={seed}")));
-    overrides.extend(args.labels.map(|labels| format!("feedback.budget={labels}")));
-    overrides.extend(args.steps.map(|steps| format!("training.total_steps={steps}")));
-    overrides.extend(args.device.as_ref().map(|device| format!("device={device}")));
-    Ok(Layers { task: args.task.clone(), method: args.method.clone(), presets: args.preset.clone(), file, overrides })
+    overrides.extend(
+        args.labels
+            .map(|labels| format!("feedback.budget={labels}")),
+    );
+    overrides.extend(
+        args.steps
+            .map(|steps| format!("training.total_steps={steps}")),
+    );
+    overrides.extend(
+        args.device
+            .as_ref()
+            .map(|device| format!("device={device}")),
+    );
+    Ok(Layers {
+        task: args.task.clone(),
+        method: args.method.clone(),
+        presets: args.preset.clone(),
+        file,
+        overrides,
+    })
 }
 
 /// The scripted teacher of that name.
@@ -151,20 +173,30 @@ fn layers(args: &Args) -> anyhow::Result<Layers> {
 /// [`BadInput`] names the nearest right one.
 pub(super) fn judge(name: &str, seed: u64) -> anyhow::Result<Box<dyn Judge>> {
     domain::teacher::judge(name, seed).ok_or_else(|| {
-        let known: Vec<&str> = domain::teacher::SCRIPTED.iter().map(|(name, _)| *name).collect();
+        let known: Vec<&str> = domain::teacher::SCRIPTED
+            .iter()
+            .map(|(name, _)| *name)
+            .collect();
         let hint = lab::nearest::nearest(name, &known).map(|n| format!(" (did you mean '{n}'?)"));
         let hint = hint.unwrap_or_default();
-        BadInput(format!("there is no teacher '{name}'{hint}; known: {}", known.join(", "))).into()
+        BadInput(format!(
+            "there is no teacher '{name}'{hint}; known: {}",
+            known.join(", ")
+        ))
+        .into()
     })
 }
 
 /// The first Ctrl-C leaves a checkpoint.
 fn stop_on_interrupt(sender: Sender<Command>) -> anyhow::Result<()> {
-    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build();
     let runtime = runtime.context("cannot listen for Ctrl-C")?;
     std::thread::spawn(move || {
         let heard = runtime.block_on(async {
-            let mut terminate = tokio::signal::unix::signal(tokio::signal::unix::SignalKind::terminate())?;
+            let mut terminate =
+                tokio::signal::unix::signal(tokio::signal::unix::SignalKind::terminate())?;
             tokio::select! {
                 heard = tokio::signal::ctrl_c() => heard,
                 _ = terminate.recv() => Ok(()),
@@ -192,11 +224,18 @@ impl Progress {
         if is_quiet {
             bar.set_draw_target(ProgressDrawTarget::hidden());
         }
-        let style = ProgressStyle::with_template("{bar:30} {pos}/{len} steps  {per_sec}  {msg}  {eta} left");
+        let style = ProgressStyle::with_template(
+            "{bar:30} {pos}/{len} steps  {per_sec}  {msg}  {eta} left",
+        );
         bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
         bar.enable_steady_tick(Duration::from_millis(500));
         bar.reset_eta();
-        Self { bar, labels: 0, task_return: 0.0, success: 0.0 }
+        Self {
+            bar,
+            labels: 0,
+            task_return: 0.0,
+            success: 0.0,
+        }
     }
 
     fn show(&mut self, event: &Event) {
@@ -213,7 +252,10 @@ impl Progress {
                     if !self.bar.is_hidden() {
                         println!(
                             "step {:>7}  labels {:>5}  success {:.2}  return {:>7.1}",
-                            evaluation.step, evaluation.labels, evaluation.success_rate, evaluation.return_mean
+                            evaluation.step,
+                            evaluation.labels,
+                            evaluation.success_rate,
+                            evaluation.return_mean
                         );
                     }
                 });
@@ -221,6 +263,8 @@ impl Progress {
             _ => {}
         }
         let (labels, task_return, success) = (self.labels, self.task_return, self.success);
-        self.bar.set_message(format!("labels {labels}  return {task_return:.0}  success {success:.2}"));
+        self.bar.set_message(format!(
+            "labels {labels}  return {task_return:.0}  success {success:.2}"
+        ));
     }
 }
