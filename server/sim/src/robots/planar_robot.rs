@@ -36,7 +36,7 @@ const JAW_STEP: f32 = 0.16;
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct PlanarRobot {
     body: RigidBodyHandle,
-    /// How far the jaws are open, in [0, 1]: 1 open, 0 closed on nothing.
+    /// how far the jaws are open, in [0, 1]: 1 open, 0 closed.
     pub openness: f32,
 }
 
@@ -141,7 +141,7 @@ impl PlanarRobot {
     }
 
     /// Moves the jaws for one control step towards where `command` wants them (+1 closed, −1
-    /// open), not beyond `narrowest`: 0, or the width of what is between them.
+    /// open), not beyond `narrowest`: 0, or the width that they stop at.
     pub fn move_jaws(&mut self, command: f32, narrowest: f32) {
         let missing = 0.5 * (1.0 - command) - self.openness;
         self.openness = (self.openness + missing.clamp(-JAW_STEP, JAW_STEP)).clamp(narrowest, 1.0);

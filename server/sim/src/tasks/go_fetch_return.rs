@@ -17,11 +17,10 @@
 //! everything at rest, jaws open.
 //!
 //! # Taking and dropping
-//! o is the jaws' openness: 1 open, 0.45 around the object, 0 closed on nothing; it follows the
-//! command by up to 0.16 a step. The object is **between the jaws** when ‖b − j‖ ≤ 0.14 and o ≥ 0.45:
-//! jaws that came closed must open first. Closing to 0.45 with the object between them **takes**
-//! it: from then on it is lifted and drawn to j. Opening to 0.6 **drops** it where it is; it is
-//! also lost when something holds it back by more than 0.2.
+//! o is the jaws' openness: 1 open, 0.45 closed; it follows the command by up to 0.16 a step. The
+//! object is **between the jaws** when ‖b − j‖ ≤ 0.14. Closing them with the object between them
+//! **takes** it: from then on it is lifted and drawn to j. Opening to 0.6 **drops** it where it
+//! is; it is also lost when something holds it back by more than 0.2.
 //!
 //! # State vector
 //! | index | content | unit |
@@ -49,7 +48,7 @@
 //! | ‖g − b‖ ≤ ρ | 10 |
 //! | the object is held | 5 + 5 · near(‖g − b‖ − ρ) |
 //! | it is between the jaws | 3 + (1 − o)/0.55, at most 4 |
-//! | otherwise | 3 · near(max(0, ‖b − j‖ − 0.14)) · (0.6 + 0.4 o) |
+//! | otherwise | 3 · near(‖b − j‖ − 0.14) |
 //!
 //! Each row pays at least as much as the best of the rows below it, so waiting before a later
 //! stage never pays, nor does dropping the object before the goal.
@@ -103,7 +102,7 @@ const OBJECT_DAMPING: f32 = 5.0;
 const GOAL_RADIUS: f32 = 0.14;
 /// Between the jaws: this close to the point between them.
 const JAW_ZONE: f32 = 0.14;
-/// Openness of jaws that hold the object.
+/// Openness of closed jaws: the object just fits.
 const HELD_OPENNESS: f32 = 0.45;
 /// Openness that lets a held object go.
 const DROP_OPENNESS: f32 = 0.6;
@@ -265,14 +264,11 @@ impl State {
     /// Opens or closes the jaws and settles who holds the object.
     fn move_jaws(&mut self, command: f32) {
         let distance = norm(self.view().jaws_to_object);
-        let is_between = distance <= JAW_ZONE && self.robot.openness >= HELD_OPENNESS;
-        let has_something = self.is_held || is_between;
-        let narrowest = if has_something { HELD_OPENNESS } else { 0.0 };
-        self.robot.move_jaws(command, narrowest);
+        self.robot.move_jaws(command, HELD_OPENNESS);
         self.is_held = if self.is_held {
             self.robot.openness < DROP_OPENNESS && distance <= SLIP
         } else {
-            is_between && command > 0.0 && self.robot.openness <= HELD_OPENNESS
+            distance <= JAW_ZONE && command > 0.0 && self.robot.openness <= HELD_OPENNESS
         };
     }
 
@@ -355,12 +351,11 @@ fn build_object(world: &mut World, position: [f32; 2]) -> RigidBodyHandle {
 
 /// Drives straight at the object with open jaws, closes them on it, drives straight to the goal.
 fn expert(observation: &[f32]) -> Vec<f32> {
-    let openness = 0.5 + 0.5 * observation[6];
     let is_held = observation[7] > 0.0;
     let to_object = [observation[8] * FLOOR_HALF, observation[9] * FLOOR_HALF];
     let to_goal = [observation[12] * FLOOR_HALF, observation[13] * FLOOR_HALF];
     let way = if is_held { to_goal } else { to_object };
-    let is_between = norm(to_object) <= JAW_ZONE && openness >= HELD_OPENNESS;
+    let is_between = norm(to_object) <= JAW_ZONE;
     let jaws = if is_held || is_between { 1.0 } else { -1.0 };
     let drive = way.map(|x| 5.0 * x);
     let length = norm(drive).max(1.0);

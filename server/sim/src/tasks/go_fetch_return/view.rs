@@ -48,10 +48,10 @@ impl View {
             10.0
         } else if self.is_held {
             5.0 + 5.0 * near(to_goal - GOAL_RADIUS)
-        } else if to_object <= JAW_ZONE && self.openness >= HELD_OPENNESS {
+        } else if to_object <= JAW_ZONE {
             3.0 + (1.0 - self.openness) / (1.0 - HELD_OPENNESS)
         } else {
-            3.0 * near((to_object - JAW_ZONE).max(0.0)) * (0.6 + 0.4 * self.openness)
+            3.0 * near(to_object - JAW_ZONE)
         }))
     }
 
