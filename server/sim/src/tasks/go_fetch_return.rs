@@ -9,7 +9,7 @@
 //! body pushes what it touches. p is its centre, n its nose (a unit vector) and
 //! **j = p + 0.25 n** the point between its jaws. The object, a disc of radius 0.075, is at b; it
 //! slides and comes to rest by itself. The goal, at g, is a mark on the floor of radius
-//! ρ = 0.14.
+//! ρ = 0.2.
 //!
 //! An episode has exactly **100** control steps of **0.05 s** (one world step with two substeps)
 //! and ends by the time limit only. Reset: p ~ U[−0.9, 0.9]², nose in any direction, then b and
@@ -46,7 +46,7 @@
 //! | while | reward |
 //! |---|---|
 //! | ‖g − b‖ ≤ ρ | 10 |
-//! | the object is held | 5 + 5 · near(‖g − b‖ − ρ) |
+//! | the object is held | 5 + 3 · near(‖g − b‖ − ρ) |
 //! | it is between the jaws | 3 + (1 − o)/0.55, at most 4 |
 //! | otherwise | 3 · near(‖b − j‖ − 0.14) |
 //!
@@ -54,7 +54,7 @@
 //! stage never pays, nor does dropping the object before the goal.
 //!
 //! # Success
-//! ‖g − b‖ ≤ ρ = 0.14: the object's centre over the mark, held or not.
+//! ‖g − b‖ ≤ ρ = 0.2: the object's centre over the mark, held or not.
 //!
 //! # Stages
 //! `return` while the object is held or at the goal; otherwise `fetch` while ‖b − j‖ ≤ 0.35, and
@@ -99,7 +99,7 @@ const OBJECT_RADIUS: f32 = 0.075;
 const OBJECT_MASS: f32 = 0.2;
 /// Slows a pushed object by the floor's friction, 1/s.
 const OBJECT_DAMPING: f32 = 5.0;
-const GOAL_RADIUS: f32 = 0.14;
+const GOAL_RADIUS: f32 = 0.2;
 /// Between the jaws: this close to the point between them.
 const JAW_ZONE: f32 = 0.14;
 /// Openness of closed jaws: the object just fits.

@@ -113,7 +113,7 @@ fn the_reward_agrees_with_values_worked_out_by_hand() {
     assert!((reward(view(JAW_ZONE + 1.0, 1.0, false, 1.0)) - 3.0 * 0.426_225).abs() < 1e-5);
     assert!((reward(view(JAW_ZONE + 1.0, 0.5, false, 1.0)) - 3.0 * 0.426_225).abs() < 1e-5);
     assert!(
-        (reward(view(0.0, 0.45, true, 1.0 + GOAL_RADIUS)) - (5.0 + 5.0 * 0.426_225)).abs() < 1e-5
+        (reward(view(0.0, 0.45, true, 1.0 + GOAL_RADIUS)) - (5.0 + 3.0 * 0.426_225)).abs() < 1e-5
     );
     assert!((reward(view(0.05, 0.725, false, 1.0)) - 3.5).abs() < 1e-5);
     assert!((reward(view(0.05, 0.725, false, 0.1)) - 10.0).abs() < 1e-12);

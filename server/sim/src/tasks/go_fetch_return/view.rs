@@ -47,7 +47,7 @@ impl View {
         TaskReward(f64::from(if self.is_success() {
             10.0
         } else if self.is_held {
-            5.0 + 5.0 * near(to_goal - GOAL_RADIUS)
+            5.0 + 3.0 * near(to_goal - GOAL_RADIUS)
         } else if to_object <= JAW_ZONE {
             3.0 + (1.0 - self.openness) / (1.0 - HELD_OPENNESS)
         } else {
