@@ -48,10 +48,6 @@ pub struct BadInput(pub String);
 
 impl BadInput {
     /// An error whose cause is the input, with all that it says.
-    #[expect(
-        clippy::needless_pass_by_value,
-        reason = "so that `map_err` takes it as it is"
-    )]
     pub fn from_error(error: impl Into<anyhow::Error>) -> anyhow::Error {
         let error: anyhow::Error = error.into();
         Self(format!("{error:#}")).into()

@@ -31,7 +31,7 @@ pub struct Problem {
     /// The answer that exists already, where that is the problem.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(value_type = Option<Object>)]
-    pub existing: Option<Value>,
+    pub existing: Option<Box<Value>>,
 }
 
 impl Problem {
@@ -214,10 +214,10 @@ impl From<StoreError> for Problem {
                 "That answer cannot be replaced here",
             ),
             StoreError::Different(existing) => Self {
-                existing: Some(json!({
+                existing: Some(Box::new(json!({
                     "answer_id": existing.id, "answer": existing.pressed, "sequence": existing.sequence,
                     "stored_at": rfc3339(existing.stored_at_ms),
-                })),
+                }))),
                 ..problem(
                     StatusCode::CONFLICT,
                     "/problems/already-answered",

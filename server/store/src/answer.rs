@@ -271,7 +271,7 @@ async fn find_lease(
     .bind(lease)
     .fetch_optional(&mut *t.connection)
     .await?;
-    let row = row.ok_or_else(|| StoreError::missing("lease", lease))?;
+    let row = row.ok_or_else(|| StoreError::missing("lease", &lease))?;
     if row.try_get::<i64, _>(0)? != labeler.0 {
         return Err(StoreError::NotYours);
     }

@@ -50,7 +50,7 @@ impl Store {
             .bind(sha256)
             .fetch_optional(self.readers())
             .await?;
-        let row = row.ok_or_else(|| StoreError::missing("clip", sha256))?;
+        let row = row.ok_or_else(|| StoreError::missing("clip", &sha256))?;
         let info = ClipInfo {
             sha256: row.try_get(0)?,
             n_frames: row.try_get(1)?,

@@ -120,7 +120,7 @@ pub enum StoreError {
 }
 
 impl StoreError {
-    pub(crate) fn missing(what: &'static str, id: impl ToString) -> Self {
+    pub(crate) fn missing(what: &'static str, id: &impl std::fmt::Display) -> Self {
         Self::Missing {
             what,
             id: id.to_string(),
@@ -138,7 +138,7 @@ impl From<sqlx::Error> for StoreError {
         };
         let code = said
             .try_downcast_ref::<SqliteError>()
-            .and_then(|e| e.code());
+            .and_then(SqliteError::code);
         let code: i32 = code.and_then(|code| code.parse().ok()).unwrap_or(0);
         match code & 0xff {
             8 => Self::ReadOnly,

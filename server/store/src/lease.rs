@@ -80,7 +80,7 @@ impl Store {
                 let row = sqlx::query("select method from run where id = ?").bind(run.0);
                 let row = row.fetch_optional(&mut *t.connection).await?;
                 let method: String = row
-                    .ok_or_else(|| StoreError::missing("run", run))?
+                    .ok_or_else(|| StoreError::missing("run", &run))?
                     .try_get(0)?;
                 renew(t, run, labeler, now_ms).await?;
                 let mut n_open = count_open(t, run, labeler).await?;

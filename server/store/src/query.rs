@@ -227,7 +227,7 @@ impl Store {
         .fetch_all(self.readers())
         .await?;
         let [first, second] = rows.as_slice() else {
-            return Err(StoreError::missing("query", query.0));
+            return Err(StoreError::missing("query", &query.0));
         };
         let rewards = |row: &sqlx::sqlite::SqliteRow| -> Result<Vec<f64>, StoreError> {
             let bytes: Vec<u8> = row.try_get(3)?;

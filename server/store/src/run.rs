@@ -190,7 +190,7 @@ impl Store {
                 let row = sqlx::query("select state from run where id = ?").bind(run.0);
                 let row = row.fetch_optional(&mut *t.connection).await?;
                 let before: String = row
-                    .ok_or_else(|| StoreError::missing("run", run))?
+                    .ok_or_else(|| StoreError::missing("run", &run))?
                     .try_get(0)?;
                 let now = now_ms();
                 sqlx::query(
@@ -272,7 +272,7 @@ impl Store {
         .bind(run.0)
         .fetch_optional(self.readers())
         .await?;
-        let row = row.ok_or_else(|| StoreError::missing("run", run))?;
+        let row = row.ok_or_else(|| StoreError::missing("run", &run))?;
         Ok(Progress {
             answered: row.try_get(0)?,
             budget: row.try_get(1)?,

@@ -91,7 +91,7 @@ impl Store {
     pub async fn add_teacher_token(&self, run: RunId) -> Result<Secret, StoreError> {
         self.run(run)
             .await?
-            .ok_or_else(|| StoreError::missing("run", run))?;
+            .ok_or_else(|| StoreError::missing("run", &run))?;
         let secret = Secret::random()?;
         let hash = secret.hash();
         self.write(move |t| {

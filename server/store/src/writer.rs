@@ -129,7 +129,9 @@ async fn write_all(
             tracing::error!("a transaction was not committed: {error}");
             let _ = connection.execute("rollback").await; // there may be none to roll back
         } else {
-            notices.into_iter().for_each(|notice| board.tell(notice));
+            for notice in notices {
+                board.tell(notice);
+            }
         }
         for job in group.drain(..) {
             job.finish(committed.clone());

@@ -311,7 +311,7 @@ fn queue_view(
     queue: Queue,
     progress: Progress,
 ) -> QueueView {
-    let phase = app.live.phase(run.id).map(phase_view);
+    let phase = app.live.phase(run.id).map(|phase| phase_view(&phase));
     let view = |kind, message: &str, until| QueueView {
         kind,
         message: message.to_owned(),
@@ -354,7 +354,7 @@ fn queue_view(
     }
 }
 
-fn phase_view(phase: lab::message::Phase) -> PhaseView {
+fn phase_view(phase: &lab::message::Phase) -> PhaseView {
     let progress = match (phase.until_step, phase.session_answers) {
         (Some(until), _) if until > 0 => Some((phase.step as f64 / until as f64).min(1.0)),
         (_, Some((got, needed))) if needed > 0 => Some(f64::from(got) / f64::from(needed)),

@@ -39,6 +39,10 @@ pub struct Args {
 ///
 /// # Errors
 /// [`BadInput`] for names that do not exist; whatever the simulation refuses.
+#[expect(
+    clippy::needless_pass_by_value,
+    reason = "every command has this signature"
+)]
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if !(args.noise >= 0.0 && args.noise.is_finite()) {
         return Err(BadInput(format!("--noise is {}, but must be 0 or more", args.noise)).into());

@@ -52,6 +52,10 @@ enum Form {
 /// # Errors
 /// [`BadInput`] for an unknown task, policy, camera or kind of file; whatever keeps the picture
 /// from being drawn or written.
+#[expect(
+    clippy::needless_pass_by_value,
+    reason = "every command has this signature"
+)]
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let task = find_task(&args.task).map_err(BadInput::from_error)?;
     let form = form(&args.out, args.sheet)?;

@@ -68,6 +68,10 @@ pub struct Args {
 ///
 /// # Errors
 /// Settings that do not fit ([`BadInput`]), a folder that cannot be written, a run that fails.
+#[expect(
+    clippy::needless_pass_by_value,
+    reason = "every command has this signature"
+)]
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let (mut run, folder) = open(&args)?;
     let judge = judge(&args.teacher, run.config().seed)?;
