@@ -190,7 +190,7 @@ impl Default for EvaluationConfig {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ConfigError {
     /// A name that no registry holds.
-    #[error("there is no {what} '{name}'{}; known: {known}", hint(.nearest))]
+    #[error("there is no {what} '{name}'{}; known: {known}", hint(.nearest.as_ref()))]
     UnknownName {
         /// `task`, `method`, `preset`.
         what: &'static str,
@@ -221,9 +221,8 @@ pub enum ConfigError {
     },
 }
 
-fn hint(nearest: &Option<String>) -> String {
+fn hint(nearest: Option<&String>) -> String {
     nearest
-        .as_ref()
         .map(|n| format!(" (did you mean '{n}'?)"))
         .unwrap_or_default()
 }
@@ -349,6 +348,9 @@ impl RunConfig {
     }
 
     /// The whole tree as TOML.
+    ///
+    /// # Panics
+    /// Never: a tree of plain values can always be written as TOML.
     pub fn to_toml(&self) -> String {
         toml::to_string(self).expect("a tree of plain values is always TOML")
     }

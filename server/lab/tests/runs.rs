@@ -1,4 +1,8 @@
 //! Whole runs of the small task: what a run promises, and the direction of learning.
+#![expect(
+    clippy::unwrap_used,
+    reason = "a story that cannot go on fails where it stands"
+)]
 
 use std::path::PathBuf;
 use std::sync::mpsc::channel;
@@ -178,12 +182,9 @@ impl Teacher for Choosy {
 
     fn collect(&mut self, after: u64) -> Result<Vec<Answered>, TeacherError> {
         let answers = self.oracle.collect(after)?;
-        let refuse = |a: Answered| match self.skipped.contains(&a.key) {
-            true => Answered {
-                preference: None,
-                ..a
-            },
-            false => a,
+        let refuse = |a: Answered| Answered {
+            preference: a.preference.filter(|_| !self.skipped.contains(&a.key)),
+            ..a
         };
         Ok(answers.into_iter().map(refuse).collect())
     }
@@ -246,15 +247,18 @@ fn a_second_run_is_not_started_in_the_folder_of_the_first() {
     assert!(error.to_string().contains("holds a run already"), "{error}");
 }
 
-/// The small task from 80 answers: the oracle's teach it, a coin's do not.
+/// The small task from some sixty answers: the oracle's teach it, a coin's do not.
 #[test]
 fn answers_teach_the_task_and_a_coin_does_not() {
-    let success = |teacher: &str| {
+    let task_return = |teacher: &str| {
         let folder = Folder::new(teacher);
-        let config = resolve("stair", &["quick"], &["evaluation.every=0"]);
-        let mut run = Run::start(config, &folder.0).unwrap();
-        finished(drive(&mut run, &mut Scripted::new(judge(teacher, 1).unwrap(), 0)).0).success_rate
+        let settings = ["evaluation.every=0", "training.total_steps=22000"];
+        let mut run = Run::start(resolve("stair", &["quick"], &settings), &folder.0).unwrap();
+        finished(drive(&mut run, &mut Scripted::new(judge(teacher, 1).unwrap(), 0)).0).return_mean
     };
-    let (taught, untaught) = (success("oracle"), success("coin"));
-    assert!(taught > untaught + 0.3, "oracle {taught}, coin {untaught}");
+    let (taught, untaught) = (task_return("oracle"), task_return("coin"));
+    assert!(
+        taught > untaught + 100.0,
+        "oracle {taught}, coin {untaught}"
+    );
 }
