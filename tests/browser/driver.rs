@@ -20,7 +20,7 @@ pub(crate) enum Scheme {
 /// One browser window; closing is dropping.
 pub(crate) struct Browser {
     pub(crate) client: Client,
-    driver: Child,
+    _driver: Driver,
     _profile: tempfile::TempDir,
 }
 
@@ -36,12 +36,13 @@ impl Browser {
             eprintln!("SKIPPED, this story was NOT tested: {how}");
             return None;
         };
-        let mut driver = Command::new(chromedriver)
+        let driver = Command::new(chromedriver)
             .args(["--port=0", "--log-level=SEVERE"])
             .stdout(Stdio::piped())
             .spawn()
             .expect("chromedriver starts");
-        let port = port_of(&mut driver);
+        let mut driver = Driver(driver);
+        let port = port_of(&mut driver.0);
         let profile = tempfile::tempdir().expect("a temporary folder");
         let capabilities = capabilities(&chromium, profile.path(), scheme, size);
         let client = ClientBuilder::new(HttpConnector::new())
@@ -51,7 +52,7 @@ impl Browser {
             .expect("chromedriver opens a window");
         Some(Self {
             client,
-            driver,
+            _driver: driver,
             _profile: profile,
         })
     }
@@ -127,11 +128,16 @@ impl Browser {
     }
 }
 
-impl Drop for Browser {
+/// ChromeDriver's process; its Chromium ends with it.
+struct Driver(Child);
+
+impl Drop for Driver {
     fn drop(&mut self) {
-        // ChromeDriver ends its Chromium with itself; both may be gone already.
-        let _ = self.driver.kill();
-        let _ = self.driver.wait();
+        // ChromeDriver ends its Chromium when it is asked to; when killed, it may leave it behind.
+        let asked = Command::new("kill").arg(self.0.id().to_string()).status();
+        if asked.is_ok_and(|status| status.success()) {
+            let _ = self.0.wait(); // it may be gone already
+        }
     }
 }
 
@@ -147,7 +153,7 @@ fn port_of(driver: &mut Child) -> u16 {
     let mut lines = BufReader::new(output).lines().map_while(Result::ok);
     let port = lines
         .find_map(|line| {
-            line.split("on port ")
+            line.split("successfully on port ")
                 .nth(1)?
                 .trim_end_matches('.')
                 .parse()

@@ -14,7 +14,10 @@ fn a_teacher_over_http_makes_an_agent_of_go_fetch_return_better() {
     let server = ServerProcess::start(data.path());
     let returns = returns_while_taught(&server, 1);
     let (first, last) = (returns[0], returns[returns.len() - 1]);
-    assert!(last > first + BETTER_BY, "returns of the trials: {returns:?}");
+    assert!(
+        last > first + BETTER_BY,
+        "returns of the trials: {returns:?}"
+    );
 }
 
 /// Mean task return of each evaluation of a run that a scripted teacher answers over HTTP.
@@ -41,5 +44,7 @@ fn returns_while_taught(server: &ServerProcess, seed: u64) -> Vec<f64> {
     let rows = server.ask("GET", &format!("{path}/metrics"), None);
     let rows = rows.as_array().expect("a list of events");
     let trials = rows.iter().filter(|row| row["kind"] == "evaluation");
-    trials.map(|row| row["return_mean"].as_f64().expect("a number")).collect()
+    trials
+        .map(|row| row["return_mean"].as_f64().expect("a number"))
+        .collect()
 }
