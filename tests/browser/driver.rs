@@ -171,7 +171,7 @@ fn capabilities(
     scheme: Scheme,
     size: (u32, u32),
 ) -> Capabilities {
-    let preferred = if scheme == Scheme::Dark { 0 } else { 1 };
+    let preferred = i32::from(scheme != Scheme::Dark);
     let arguments = [
         "--headless",
         "--no-sandbox",
@@ -187,7 +187,7 @@ fn capabilities(
     ]
     .map(str::to_owned);
     let options = json!({ "binary": chromium, "args": arguments });
-    let timeouts = json!({ "script": Duration::from_secs(120).as_millis() as u64 });
+    let timeouts = json!({ "script": Duration::from_mins(2).as_millis() as u64 });
     [
         ("goog:chromeOptions".to_owned(), options),
         ("timeouts".to_owned(), timeouts),

@@ -80,9 +80,9 @@ fn as_text() -> String {
             .map(|(name, _)| name.len())
             .max()
             .unwrap_or_default();
-        text += &format!("{heading}\n");
+        text.extend([heading, "\n"]);
         for (name, summary) in rows {
-            text += &format!("  {name:width$}  {summary}\n");
+            text.extend([format!("  {name:width$}  {summary}\n")]);
         }
     };
     let tasks: Vec<_> = sim::tasks::tasks()

@@ -20,7 +20,7 @@ const LEASES: u32 = 50;
 /// Pause while the agent collects experience or fits its reward.
 const WAIT: Duration = Duration::from_millis(200);
 /// How long a server may be away in the middle, for example while it is restarted.
-const PATIENCE: Duration = Duration::from_secs(120);
+const PATIENCE: Duration = Duration::from_mins(2);
 
 /// Answer a run's queries over HTTP with a scripted teacher, until the run needs no more
 #[derive(Debug, clap::Args)]
@@ -99,6 +99,7 @@ struct Remote {
 
 /// The part of a lease that a program needs.
 #[derive(Deserialize)]
+#[expect(clippy::struct_field_names, reason = "the names of the API's fields")]
 struct Lease {
     lease_id: Id,
     query_id: Id,

@@ -53,13 +53,13 @@ impl Driver {
         let is_to_go_on =
             line.kind == StateKind::Stopped && self.inner.is_closing.load(Ordering::SeqCst);
         if !is_to_go_on {
-            self.show(line);
+            self.show(&line);
         }
         lock(&self.now).has_ended = true;
     }
 
     fn drive(&self, commands: &Receiver<Command>) -> anyhow::Result<StateLine> {
-        self.show(StateLine::opening());
+        self.show(&StateLine::opening());
         let row = self
             .wait(self.inner.store.run(self.run))?
             .context("the store does not know this run")?;
@@ -116,7 +116,7 @@ impl Driver {
 
     /// Shows what is only of the moment.
     fn say(&self, phase: Phase, config: &RunConfig) {
-        self.show(StateLine::of_phase(&phase, config));
+        self.show(&StateLine::of_phase(&phase, config));
         lock(&self.now).phase = Some(phase.clone());
         let data = serde_json::to_value(Event::Phase(phase)).unwrap_or_default();
         let _ = self.inner.events.send(LiveEvent {
@@ -151,7 +151,7 @@ impl Driver {
     }
 
     /// Keeps the line of the moment in memory; the store hears of it when its kind changes.
-    fn show(&self, line: StateLine) {
+    fn show(&self, line: &StateLine) {
         let is_new = {
             let mut now = lock(&self.now);
             now.line = Some(line.clone());

@@ -19,6 +19,10 @@ const N_PAIRS: u32 = 6;
 
 #[derive(Template)]
 #[template(path = "run.html")]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "a page says many things or leaves them out"
+)]
 struct RunPage {
     /// The run's number.
     run: String,
