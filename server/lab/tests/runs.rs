@@ -247,12 +247,12 @@ fn a_second_run_is_not_started_in_the_folder_of_the_first() {
     assert!(error.to_string().contains("holds a run already"), "{error}");
 }
 
-/// The small task from some sixty answers: the oracle's teach it, a coin's do not.
+/// The small task from some ninety answers: the oracle's teach it, a coin's do not.
 #[test]
 fn answers_teach_the_task_and_a_coin_does_not() {
     let task_return = |teacher: &str| {
         let folder = Folder::new(teacher);
-        let settings = ["evaluation.every=0", "training.total_steps=22000"];
+        let settings = ["evaluation.every=0", "training.total_steps=28000"];
         let mut run = Run::start(resolve("stair", &["quick"], &settings), &folder.0).unwrap();
         finished(drive(&mut run, &mut Scripted::new(judge(teacher, 1).unwrap(), 0)).0).return_mean
     };
