@@ -20,6 +20,9 @@ const SETTINGS: &[&str] = &[
     "evaluation.episodes=5",
     "agent.hidden=[64, 64]",
     "agent.batch=128",
+    "reward.hidden=[64, 64]",
+    "temporal.update_every=8",
+    "temporal.batch=64",
     "environment.n_envs=2",
 ];
 
