@@ -252,8 +252,8 @@ impl Progress {
             }
             Event::Evaluation(evaluation) => {
                 self.success = evaluation.success_rate;
-                self.bar.suspend(|| {
-                    if !self.bar.is_hidden() {
+                if !self.bar.is_hidden() {
+                    self.bar.suspend(|| {
                         println!(
                             "step {:>7}  labels {:>5}  success {:.2}  return {:>7.1}",
                             evaluation.step,
@@ -261,8 +261,8 @@ impl Progress {
                             evaluation.success_rate,
                             evaluation.return_mean
                         );
-                    }
-                });
+                    });
+                }
             }
             _ => {}
         }
