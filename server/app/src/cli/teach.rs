@@ -49,7 +49,7 @@ pub struct Args {
 /// Runs the command.
 ///
 /// # Errors
-/// [`BadInput`] for a server that cannot be reached, an unknown run or teacher, a wrong token;
+/// [`super::BadInput`] for a server that cannot be reached, an unknown run or teacher, a wrong token;
 /// anything else that the server refuses.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     super::train::judge(&args.teacher, 0)?; // a wrong name is said before anything is sent
