@@ -1,7 +1,7 @@
 //! Replays recordings of the original environments through the functions that ours call.
 //!
 //! A recording is a file of JSON Lines. A *transition* holds what the original's physics said
-//! after a step and what the original made of it; the same [`window_open::Readings`] are built
+//! after a step and what the original made of it; the same [`crate::tasks::window_open::Readings`] are built
 //! from the line as from our physics, and observation, reward and success are compared. A
 //! *reset* line is checked in what the original reads freshly, a *trajectory* line in reward and
 //! success, its numbers being rounded more. Other lines are counted as skipped, with the reason.
