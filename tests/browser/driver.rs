@@ -62,14 +62,19 @@ impl Browser {
         self.client.goto(url).await.expect("the page loads");
     }
 
-    /// Presses one key, as a person does.
+    /// Presses one key, as a person does: again when nothing on the page could take it yet.
     pub(crate) async fn press(&self, key: &str) {
-        let body = self
-            .client
-            .active_element()
-            .await
-            .expect("something has the focus");
-        body.send_keys(key).await.expect("the key is pressed");
+        let mut refused = None;
+        for _ in 0..20 {
+            let focused = self.client.active_element().await;
+            let focused = focused.expect("something has the focus");
+            match focused.send_keys(key).await {
+                Ok(()) => return,
+                Err(error) => refused = Some(error),
+            }
+            self.until("document.readyState === 'complete'").await;
+        }
+        panic!("no key could be pressed: {refused:?}");
     }
 
     /// Value of a JavaScript expression.
@@ -113,7 +118,7 @@ impl Browser {
     /// Waits until an expression is true; fails with the page's words when it never becomes so.
     pub(crate) async fn until(&self, expression: &str) {
         let script = format!(
-            "const end = performance.now() + 60000;
+            "const end = performance.now() + 110000;
              while (performance.now() < end) {{
                if ({expression}) return true;
                await new Promise((resolve) => setTimeout(resolve, 20));
