@@ -18,7 +18,7 @@ pub(crate) fn run(workspace: &Workspace, arguments: &[String]) -> Result<(), Fai
     let title = if program.exists() {
         "cargo build --release"
     } else {
-        "cargo build --release (the first time takes some fifteen minutes on two cores)"
+        "cargo build --release (the first time takes long)"
     };
     child::run(title, &mut build)?;
     hand_over(Command::new(&program).arg("serve").args(arguments))
