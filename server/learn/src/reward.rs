@@ -33,6 +33,10 @@ pub struct RewardConfig {
     /// Fitting stops after a pass in which this share of the preferences was right, mean over
     /// members.
     pub stop_accuracy: f32,
+    /// How far a preference is trained from certainty, in [0, ½): towards P = 1 − margin instead
+    /// of 1. Without it, few answers that are passed over often saturate the tanh, and later
+    /// answers can no longer move the reward there. B-Pref's `label_margin`.
+    pub label_margin: f64,
 }
 
 impl Default for RewardConfig {
@@ -44,6 +48,7 @@ impl Default for RewardConfig {
             batch: 128,
             max_epochs: 10,
             stop_accuracy: 0.97,
+            label_margin: 0.0,
         }
     }
 }
@@ -138,8 +143,8 @@ impl RewardEnsemble {
     /// right often enough or the passes are used up.
     ///
     /// Each member sees the preferences in its own order. The loss is the cross-entropy of
-    /// P(second ≻ first) = σ(Σ r(second) − Σ r(first)) to 0, 1, or ½ for equal, mean over a
-    /// minibatch, summed over members.
+    /// P(second ≻ first) = σ(Σ r(second) − Σ r(first)) to 0, 1 (less the label margin), or ½ for
+    /// equal, mean over a minibatch, summed over members.
     ///
     /// Source: BPref's `train_soft_reward` without smoothing. Differs from the code: equal
     /// preferences need no global switch.
@@ -224,12 +229,13 @@ impl RewardEnsemble {
             let mut slopes = Vec::with_capacity(pairs.len());
             for (index, (labeled, logit)) in pairs.iter().zip(logits).enumerate() {
                 let pass = &mut passes[index / n];
-                let target = f64::from(labeled.preference.target());
+                let certain = f64::from(labeled.preference.target());
+                let target = certain + self.config.label_margin * (1.0 - 2.0 * certain);
                 let probability = 1.0 / (1.0 + (-logit).exp());
                 pass.loss += softplus(logit) - target * logit;
                 if labeled.preference != Preference::Equal {
                     pass.n_judged += 1;
-                    pass.n_right += u32::from((logit > 0.0) == (target > 0.5));
+                    pass.n_right += u32::from((logit > 0.0) == (certain > 0.5));
                 }
                 slopes.push((probability - target) * weight);
             }

@@ -25,14 +25,19 @@
 //! # State vector
 //! | index | content | unit |
 //! |---|---|---|
-//! | 0–1 | p | 1.2 m |
-//! | 2–3 | velocity of the robot | 1 m/s |
-//! | 4–5 | n | – |
-//! | 6 | 2 o − 1 | – |
-//! | 7 | 1 while the object is held, else −1 | – |
-//! | 8–9 | b − j | 1.2 m |
-//! | 10–11 | the same from close by: b − j, cut to ±1 | 0.25 m |
-//! | 12–13 | g − b | 1.2 m |
+//! | 0–1 | velocity of the robot | 1 m/s |
+//! | 2–3 | n | – |
+//! | 4 | 2 o − 1 | – |
+//! | 5 | 1 while the object is held, else −1 | – |
+//! | 6–7 | b − j | 1.2 m |
+//! | 8–9 | the same from close by: b − j, cut to ±1 | 0.25 m |
+//! | 10 | how near the object is: 1 − ‖b − j‖/2 m, not below 0 | – |
+//! | 11–15 | 6–10 for g − b instead of b − j; zeros while the goal is out of sight | as above |
+//! | 16 | 1 while the object is at the goal, else −1 | – |
+//!
+//! The goal is **in sight** while the object is held or at the goal. Nothing in a state tells one
+//! episode from another, so the states of a stage look alike wherever things lie, and a distance
+//! learned between states measures progress, not which episode they come from.
 //!
 //! # Action
 //! | index | content |
@@ -88,7 +93,7 @@ pub const TASK: Task = Task {
 const NAME: &str = "go-fetch-return";
 const EPISODE_LEN: u32 = 100;
 const CONTROL_PERIOD_S: f32 = 0.05;
-const OBSERVATION_SIZE: usize = 14;
+const OBSERVATION_SIZE: usize = 17;
 const ACTION_SIZE: usize = 3;
 const POSE_SIZE: usize = 9;
 
@@ -114,6 +119,8 @@ const GRIP_FREQUENCY: f32 = 30.0;
 const FETCH_DISTANCE: f32 = 0.35;
 /// Unit of the close-up components of the state vector.
 const CLOSE_UP: f32 = 0.25;
+/// Where nearness, another component, has fallen to zero.
+const FAR: f32 = 2.0;
 
 const STAGES: [&str; 3] = ["go", "fetch", "return"];
 
@@ -351,9 +358,9 @@ fn build_object(world: &mut World, position: [f32; 2]) -> RigidBodyHandle {
 
 /// Drives straight at the object with open jaws, closes them on it, drives straight to the goal.
 fn expert(observation: &[f32]) -> Vec<f32> {
-    let is_held = observation[7] > 0.0;
-    let to_object = [observation[8] * FLOOR_HALF, observation[9] * FLOOR_HALF];
-    let to_goal = [observation[12] * FLOOR_HALF, observation[13] * FLOOR_HALF];
+    let is_held = observation[5] > 0.0;
+    let to_object = [observation[6] * FLOOR_HALF, observation[7] * FLOOR_HALF];
+    let to_goal = [observation[11] * FLOOR_HALF, observation[12] * FLOOR_HALF];
     let way = if is_held { to_goal } else { to_object };
     let is_between = norm(to_object) <= JAW_ZONE;
     let jaws = if is_held || is_between { 1.0 } else { -1.0 };

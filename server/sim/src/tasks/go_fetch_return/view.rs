@@ -3,7 +3,7 @@
 
 use domain::environment::TaskReward;
 
-use super::{CLOSE_UP, FETCH_DISTANCE, FLOOR_HALF, GOAL_RADIUS, HELD_OPENNESS, JAW_ZONE};
+use super::{CLOSE_UP, FAR, FETCH_DISTANCE, FLOOR_HALF, GOAL_RADIUS, HELD_OPENNESS, JAW_ZONE};
 use crate::robots::planar_robot::{PlanarState, TOP_SPEED};
 
 /// What reward, success, stage and observation depend on.
@@ -20,25 +20,24 @@ pub(super) struct View {
 
 impl View {
     pub(super) fn observation(&self) -> Vec<f32> {
-        let (position, velocity) = (self.robot.position, self.robot.velocity);
-        let (object, goal) = (self.jaws_to_object, self.object_to_goal);
-        let close_up = object.map(|x| (x / CLOSE_UP).clamp(-1.0, 1.0));
-        vec![
-            position[0] / FLOOR_HALF,
-            position[1] / FLOOR_HALF,
+        let (velocity, heading) = (self.robot.velocity, self.robot.heading);
+        let sees_goal = self.is_held || self.is_success();
+        let mut observation = vec![
             velocity[0] / TOP_SPEED,
             velocity[1] / TOP_SPEED,
-            self.robot.heading[0],
-            self.robot.heading[1],
+            heading[0],
+            heading[1],
             2.0 * self.openness - 1.0,
-            if self.is_held { 1.0 } else { -1.0 },
-            object[0] / FLOOR_HALF,
-            object[1] / FLOOR_HALF,
-            close_up[0],
-            close_up[1],
-            goal[0] / FLOOR_HALF,
-            goal[1] / FLOOR_HALF,
-        ]
+            sign(self.is_held),
+        ];
+        observation.extend(way(self.jaws_to_object));
+        observation.extend(if sees_goal {
+            way(self.object_to_goal)
+        } else {
+            [0.0; WAY_SIZE]
+        });
+        observation.push(sign(self.is_success()));
+        observation
     }
 
     pub(super) fn task_reward(&self) -> TaskReward {
@@ -72,6 +71,25 @@ impl View {
 /// everywhere and a point to come to.
 fn near(distance: f32) -> f32 {
     (0.6 * (1.0 - distance / 3.4) + 0.4 * (-distance / 0.2).exp()).max(0.0)
+}
+
+const WAY_SIZE: usize = 5;
+
+/// A way still to go, as the state vector shows it: from afar, from close by, and how near.
+fn way([x, y]: [f32; 2]) -> [f32; WAY_SIZE] {
+    let close_up = |x: f32| (x / CLOSE_UP).clamp(-1.0, 1.0);
+    let nearness = (1.0 - norm([x, y]) / FAR).max(0.0);
+    [
+        x / FLOOR_HALF,
+        y / FLOOR_HALF,
+        close_up(x),
+        close_up(y),
+        nearness,
+    ]
+}
+
+fn sign(is_true: bool) -> f32 {
+    if is_true { 1.0 } else { -1.0 }
 }
 
 /// Length.
