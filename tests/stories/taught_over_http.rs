@@ -1,39 +1,35 @@
-//! A scripted teacher that uses documented routes only teaches an agent from nothing.
+//! A scripted teacher that uses documented routes only teaches agents from nothing.
 
 use serde_json::json;
 
 use super::server_process::{ServerProcess, stair, wait_for};
 
-/// Task return by which the agent must have got better since its first trial, on a scale where
-/// chance earns about 110 and the expert about 850.
-const BETTER_BY: f64 = 150.0;
+/// Share of held-out episodes in which an agent that learned its task succeeds.
+const LEARNED: f64 = 0.8;
 
 #[test]
-fn a_teacher_over_http_makes_an_agent_of_go_fetch_return_better() {
+fn a_teacher_over_http_teaches_go_fetch_return_to_two_agents_of_three() {
     let data = tempfile::tempdir().expect("a temporary folder");
     let server = ServerProcess::start(data.path());
-    let returns = returns_while_taught(&server, 1);
-    let (first, last) = (returns[0], returns[returns.len() - 1]);
-    assert!(
-        last > first + BETTER_BY,
-        "returns of the trials: {returns:?}"
-    );
+    let success_rates: Vec<f64> = std::thread::scope(|scope| {
+        let agents = [1, 2, 3].map(|seed| {
+            let server = &server;
+            scope.spawn(move || success_rate_once_taught(server, seed))
+        });
+        let rates = agents.map(|agent| agent.join().expect("an agent that was taught to the end"));
+        rates.to_vec()
+    });
+    let learned = success_rates.iter().filter(|&&rate| rate >= LEARNED);
+    assert!(learned.count() >= 2, "success rates: {success_rates:?}");
 }
 
-/// Mean task return of each evaluation of a run that a scripted teacher answers over HTTP.
-fn returns_while_taught(server: &ServerProcess, seed: u64) -> Vec<f64> {
+/// Success rate in the last evaluation of a run that a scripted teacher answers over HTTP.
+fn success_rate_once_taught(server: &ServerProcess, seed: u64) -> f64 {
     let run = server.create_run("stair", seed, "quick", &json!({}));
     let url = format!("http://{}", server.address);
     let taught = stair()
-        .args([
-            "teach",
-            "--server",
-            &url,
-            "--run",
-            &run,
-            "--teacher",
-            "oracle",
-        ])
+        .args(["teach", "--server", &url, "--run", &run])
+        .args(["--teacher", "oracle"])
         .output();
     let taught = taught.expect("stair teach");
     assert!(taught.status.success(), "{taught:?}");
@@ -43,8 +39,7 @@ fn returns_while_taught(server: &ServerProcess, seed: u64) -> Vec<f64> {
     });
     let rows = server.ask("GET", &format!("{path}/metrics"), None);
     let rows = rows.as_array().expect("a list of events");
-    let trials = rows.iter().filter(|row| row["kind"] == "evaluation");
-    trials
-        .map(|row| row["return_mean"].as_f64().expect("a number"))
-        .collect()
+    let last = rows.iter().rfind(|row| row["kind"] == "evaluation");
+    let last = last.expect("an evaluation at the end");
+    last["success_rate"].as_f64().expect("a number")
 }
