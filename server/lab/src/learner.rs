@@ -23,6 +23,7 @@ pub(crate) struct Learner {
     agent: Sac,
     exploration: StateEntropy,
     batch: usize,
+    task_reward_scale: f32,
     seed: u64,
 }
 
@@ -60,6 +61,7 @@ impl Learner {
             agent: Sac::new(&config.agent, s, a, seed, device),
             exploration: StateEntropy::new(&config.exploration),
             batch: config.agent.batch,
+            task_reward_scale: config.training.task_reward_scale,
             seed,
         }
     }
@@ -79,9 +81,10 @@ impl Learner {
             agent,
             exploration,
             batch,
+            task_reward_scale,
             seed,
         } = self;
-        let (batch, seed) = (*batch, *seed);
+        let (batch, scale, seed) = (*batch, *task_reward_scale, *seed);
         let update_agent = || -> Vec<SacMetrics> {
             learn::device::init();
             (0..due.n_updates)
@@ -92,7 +95,11 @@ impl Learner {
                         sample.reward = exploration.intrinsic(&sample.observation, replay);
                         agent.update(&sample)
                     } else {
-                        agent.update(&replay.sample_with(batch, &mut rng, due.reward))
+                        let mut sample = replay.sample_with(batch, &mut rng, due.reward);
+                        if due.reward == RewardSource::Task {
+                            sample.reward.iter_mut().for_each(|r| *r *= scale);
+                        }
+                        agent.update(&sample)
                     }
                 })
                 .collect()
