@@ -11,4 +11,5 @@ pub mod random;
 pub mod sampler;
 pub mod scene;
 pub mod schedule;
+pub mod stage;
 pub mod teacher;
