@@ -91,7 +91,6 @@ impl Chain {
 
 /// One repetition: how the policy did as its reward was learned.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
 pub struct Outcome {
     /// R_bias.
     pub bias: f64,

@@ -105,9 +105,13 @@ fn curves(rows: &[&CurveRow], group: &Group, axes: Axes) -> Result<Vec<Curve>, F
             .insert(row.step, row)
             .is_some()
         {
+            let setting = match row.setting.as_str() {
+                "" => String::new(),
+                setting => format!(" ({setting})"),
+            };
             return Err(FigureError::Misfit(format!(
-                "step {} of {} with {} {}, seed {}, is given twice",
-                row.step, row.task, row.method, row.setting, row.seed
+                "step {} of {} with {}{setting}, seed {}, is given twice",
+                row.step, row.task, row.method, row.seed
             )));
         }
     }
