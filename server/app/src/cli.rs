@@ -6,7 +6,9 @@ use clap::{Parser, Subcommand};
 
 mod client;
 mod evaluate;
+mod experiment;
 mod export;
+mod figure;
 mod golden;
 mod openapi;
 mod render;
@@ -39,6 +41,8 @@ enum Command {
     Golden(golden::Args),
     Tasks(tasks::Args),
     Export(export::Args),
+    Figure(figure::Args),
+    Experiment(experiment::Args),
     Openapi(openapi::Args),
 }
 
@@ -74,6 +78,8 @@ pub fn main() -> ExitCode {
         Command::Golden(args) => golden::run(&args),
         Command::Tasks(args) => tasks::run(&args),
         Command::Export(args) => export::run(&args),
+        Command::Figure(args) => figure::run(&args),
+        Command::Experiment(args) => experiment::run(&args),
         Command::Openapi(args) => openapi::run(&args),
     };
     result.unwrap_or_else(|error| {

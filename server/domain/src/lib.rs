@@ -3,6 +3,7 @@
 //! Invariants: no input or output, no clock, no threads; randomness comes in as a [`random::Rng`];
 //! knows no other crate of the workspace.
 
+pub mod agreement;
 pub mod answer;
 pub mod environment;
 pub mod episode;
@@ -11,4 +12,5 @@ pub mod random;
 pub mod sampler;
 pub mod scene;
 pub mod schedule;
+pub mod stage;
 pub mod teacher;

@@ -5,6 +5,8 @@
 
 pub mod config;
 pub mod evaluate;
+pub mod experiment;
+pub mod figure;
 pub mod message;
 pub mod method;
 pub mod nearest;

@@ -18,7 +18,7 @@ const MAY_KNOW: [(&str, &[&str]); 8] = [
 ];
 
 /// A heavy library and the only crates that may depend on it.
-const TAMED_BY: [(&str, &[&str]); 12] = [
+const TAMED_BY: [(&str, &[&str]); 13] = [
     ("rapier3d", &["sim"]),
     ("tch", &["learn"]),
     ("torch-sys", &["learn"]),
@@ -26,6 +26,7 @@ const TAMED_BY: [(&str, &[&str]); 12] = [
     ("openh264", &["render"]),
     ("muxide", &["render"]),
     ("sqlx", &["store"]),
+    ("resvg", &["app"]),
     ("axum", &["app"]),
     ("askama", &["app"]),
     ("tower-http", &["app"]),

@@ -1,0 +1,126 @@
+//! Colours, dashes and markers.
+
+use super::svg::{Pen, Svg};
+
+/// Text.
+pub(crate) const INK: &str = "#1f2328";
+/// Text that may stand back.
+pub(crate) const QUIET: &str = "#59636e";
+/// Lines of the grid.
+pub(crate) const RULE: &str = "#e4e7eb";
+/// What everything lies on.
+pub(crate) const PAPER: &str = "#ffffff";
+
+/// The shape that marks a series' points.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Marker {
+    /// ●
+    Disc,
+    /// ■
+    Square,
+    /// ▲
+    Up,
+    /// ◆
+    Diamond,
+    /// ▼
+    Down,
+    /// ⬟
+    Pentagon,
+    /// ⬢
+    Hexagon,
+}
+
+impl Marker {
+    /// Draws it around a point, outlined by the paper so that it stands off its line.
+    pub(crate) fn draw(self, svg: &mut Svg, at: (f64, f64), radius: f64, color: &'static str) {
+        let outline = Pen::solid(PAPER, 1.2);
+        match self.corners() {
+            None => svg.disc(at, radius, color, outline),
+            Some((n, turn)) => {
+                let corner = |k: usize| {
+                    let angle = std::f64::consts::TAU * (k as f64 / n as f64 + turn);
+                    let reach = 1.25 * radius;
+                    (at.0 + reach * angle.sin(), at.1 - reach * angle.cos())
+                };
+                let corners: Vec<_> = (0..n).map(corner).collect();
+                svg.outlined(&corners, color, outline);
+            }
+        }
+    }
+
+    /// Corners of the polygon, and by which part of a turn the first one is off the top.
+    fn corners(self) -> Option<(usize, f64)> {
+        match self {
+            Self::Disc => None,
+            Self::Square => Some((4, 0.125)),
+            Self::Up => Some((3, 0.0)),
+            Self::Diamond => Some((4, 0.0)),
+            Self::Down => Some((3, 0.5)),
+            Self::Pentagon => Some((5, 0.0)),
+            Self::Hexagon => Some((6, 0.0)),
+        }
+    }
+}
+
+/// How one series looks everywhere in a figure.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Series {
+    /// `#rrggbb`.
+    pub color: &'static str,
+    /// Strokes and gaps.
+    pub dash: &'static str,
+    /// Of its points.
+    pub marker: Marker,
+}
+
+impl Series {
+    /// Its pen for a line of this width.
+    pub(crate) fn pen(self, width: f64) -> Pen {
+        Pen {
+            color: self.color,
+            width,
+            dash: self.dash,
+            opacity: 1.0,
+        }
+    }
+}
+
+/// The look of the n-th series: colours of Okabe and Ito (2008), without the yellow, which is
+/// too pale on paper. After seven they start over with other dashes.
+pub(crate) fn series(n: usize) -> Series {
+    const LOOKS: [(&str, &str, Marker); 7] = [
+        ("#0072b2", "", Marker::Disc),
+        ("#d55e00", "7 3", Marker::Square),
+        ("#009e73", "2.5 2.5", Marker::Up),
+        ("#cc79a7", "9 3 2.5 3", Marker::Diamond),
+        ("#e69f00", "5 2", Marker::Down),
+        ("#56b4e9", "12 4", Marker::Pentagon),
+        ("#000000", "1.5 3", Marker::Hexagon),
+    ];
+    let (color, dash, marker) = LOOKS[n % LOOKS.len()];
+    let dash = if n < LOOKS.len() {
+        dash
+    } else {
+        LOOKS[(n + n / LOOKS.len()) % LOOKS.len()].1
+    };
+    Series {
+        color,
+        dash,
+        marker,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_first_fourteen_series_can_be_told_apart_without_colour() {
+        for n in 0..14 {
+            for m in 0..n {
+                let (a, b) = (series(n), series(m));
+                assert!(a.dash != b.dash || a.marker != b.marker, "{m} and {n}");
+            }
+        }
+    }
+}

@@ -1,0 +1,139 @@
+//! Several seeds of several groups as lines: every seed thin, their centre on top.
+
+use domain::agreement::Bootstrap;
+
+use super::plot::{Panel, Pen, Svg, series};
+
+/// Points from left to right.
+pub(super) type Curve = Vec<(f64, f64)>;
+
+/// What the lines and areas of [`draw_seeds`] are.
+pub(super) const BAND: &str =
+    "Thin: each seed. Band: 95 % bootstrap interval over seeds, from three seeds on.";
+
+/// Seeds of one of which an interval would say nothing.
+const LEAST_FOR_BAND: usize = 3;
+
+/// Draws the seeds of each group, below all centres; the n-th group looks like the n-th series.
+pub(super) fn draw_seeds(
+    svg: &mut Svg,
+    panel: &Panel,
+    groups: &[Vec<Curve>],
+    center: fn(&[f64]) -> f64,
+) {
+    let lines: Vec<Line> = groups.iter().map(|seeds| Line::of(seeds, center)).collect();
+    for (n, line) in lines.iter().enumerate() {
+        panel.band(svg, &line.band, series(n).color);
+    }
+    for (n, seeds) in groups.iter().enumerate() {
+        let thin = Pen {
+            opacity: 0.3,
+            ..Pen::solid(series(n).color, 0.8)
+        };
+        for seed in seeds {
+            panel.line(svg, seed, thin);
+        }
+    }
+    for (n, line) in lines.iter().enumerate() {
+        let every = line.center.len().div_ceil(7).max(1);
+        panel.marked_line(svg, &line.center, series(n), (n % every, every));
+    }
+}
+
+/// The centre of a group's seeds with its interval.
+struct Line {
+    center: Curve,
+    band: Vec<(f64, f64, f64)>,
+}
+
+impl Line {
+    /// Where all seeds have been evaluated; straight lines between evaluations.
+    fn of(seeds: &[Curve], center: fn(&[f64]) -> f64) -> Self {
+        let mut line = Self {
+            center: Vec::new(),
+            band: Vec::new(),
+        };
+        for x in common_grid(seeds) {
+            let values: Vec<f64> = seeds.iter().map(|seed| interpolate(seed, x)).collect();
+            line.center.push((x, center(&values)));
+            if seeds.len() >= LEAST_FOR_BAND {
+                let found = Bootstrap::default().center(&values, center);
+                line.band
+                    .extend(found.map(|e| (x, e.interval.lo, e.interval.hi)));
+            }
+        }
+        line
+    }
+}
+
+/// Every place at which some seed was evaluated, within the range of all.
+fn common_grid(seeds: &[Curve]) -> Vec<f64> {
+    let from = seeds.iter().filter_map(|s| s.first()).map(|p| p.0);
+    let to = seeds.iter().filter_map(|s| s.last()).map(|p| p.0);
+    let (from, to) = (from.fold(f64::MIN, f64::max), to.fold(f64::MAX, f64::min));
+    let mut grid: Vec<f64> = seeds.iter().flatten().map(|p| p.0).collect();
+    grid.retain(|x| (from..=to).contains(x));
+    grid.sort_by(f64::total_cmp);
+    grid.dedup();
+    grid
+}
+
+/// The value of a curve at a place within its range.
+fn interpolate(curve: &[(f64, f64)], x: f64) -> f64 {
+    let right = curve.partition_point(|p| p.0 < x).min(curve.len() - 1);
+    let (x1, y1) = curve[right];
+    let (x0, y0) = curve[right.saturating_sub(1)];
+    if x1 > x0 {
+        y0 + (y1 - y0) * (x - x0) / (x1 - x0)
+    } else {
+        y1
+    }
+}
+
+/// Each value once.
+pub(super) fn in_order_of_appearance<T: PartialEq>(values: impl IntoIterator<Item = T>) -> Vec<T> {
+    let mut seen = Vec::new();
+    for value in values {
+        if !seen.contains(&value) {
+            seen.push(value);
+        }
+    }
+    seen
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use domain::agreement::mean;
+
+    #[test]
+    fn the_centre_is_taken_where_all_seeds_have_been_evaluated() {
+        let seeds = [
+            vec![(0.0, 0.0), (10.0, 1.0), (20.0, 1.0)],
+            vec![(5.0, 1.0), (15.0, 0.0)],
+        ];
+        let line = Line::of(&seeds, mean);
+        assert_eq!(line.center, [(5.0, 0.75), (10.0, 0.75), (15.0, 0.5)]);
+        assert!(
+            line.band.is_empty(),
+            "two seeds have no interval worth showing"
+        );
+    }
+
+    #[test]
+    fn the_band_holds_the_centre_and_lies_within_the_seeds() {
+        let seeds: Vec<Curve> = (0..5)
+            .map(|k| vec![(0.0, f64::from(k)), (1.0, 2.0)])
+            .collect();
+        let line = Line::of(&seeds, mean);
+        let (_, lo, hi) = line.band[0];
+        assert!((0.0..2.0).contains(&lo) && hi > 2.0 && hi <= 4.0);
+        assert_eq!(line.band[1], (1.0, 2.0, 2.0));
+    }
+
+    #[test]
+    fn seeds_that_share_no_range_have_no_centre() {
+        let seeds = [vec![(0.0, 1.0)], vec![(5.0, 1.0), (6.0, 1.0)], vec![]];
+        assert!(Line::of(&seeds[..2], mean).center.is_empty());
+    }
+}
