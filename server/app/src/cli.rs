@@ -5,6 +5,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 mod client;
+mod env;
 mod evaluate;
 mod export;
 mod golden;
@@ -34,6 +35,7 @@ enum Command {
     Serve(serve::Args),
     Train(train::Args),
     Evaluate(evaluate::Args),
+    Env(env::Args),
     Teach(teach::Args),
     Render(render::Args),
     Golden(golden::Args),
@@ -69,6 +71,7 @@ pub fn main() -> ExitCode {
         Command::Serve(args) => serve::run(args),
         Command::Train(args) => train::run(args),
         Command::Evaluate(args) => evaluate::run(args),
+        Command::Env(args) => env::run(args),
         Command::Teach(args) => teach::run(args),
         Command::Render(args) => render::run(args),
         Command::Golden(args) => golden::run(&args),

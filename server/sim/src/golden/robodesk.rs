@@ -82,7 +82,6 @@ struct Outcome {
     action: [f64; ACTION_SIZE],
     q_arm_before: [f64; N_JOINTS],
     target_q: [f64; N_JOINTS],
-    success: bool,
 }
 
 #[derive(Deserialize)]
@@ -192,7 +191,7 @@ fn check_outcome(checks: &mut Checks, value: &Value) -> Result<(), String> {
     let line: Outcome = read(value)?;
     let reward = number(value, "reward")?;
     checks.number("reward", readings.reward(), reward, REWARD_TOLERANCE);
-    checks.flag("success", readings.is_lit(), line.success);
+    checks.flag("success", readings.is_lit(), flag(value, "success")?);
     let ours = panda::targets(&line.q_arm_before, &line.action);
     let place = |q| links::end_effector(&links::frames(q));
     checks.numbers(
@@ -222,7 +221,7 @@ fn check_state(value: &Value) -> Result<Checks, String> {
     );
     let reward = number(value, "reward")?;
     checks.number("reward", readings.reward(), reward, REWARD_TOLERANCE);
-    let is_lit = number(value, "reward_sparse")? > 0.5;
+    let is_lit = flag(value, "reward_sparse")?;
     checks.flag("success", readings.is_lit(), is_lit);
     Ok(checks)
 }
@@ -230,6 +229,17 @@ fn check_state(value: &Value) -> Result<Checks, String> {
 fn number(value: &Value, field: &str) -> Result<f64, String> {
     let number = value.get(field).and_then(Value::as_f64);
     number.ok_or_else(|| format!("field `{field}` is no number"))
+}
+
+/// true or false, 0 or 1.
+fn flag(value: &Value, field: &str) -> Result<bool, String> {
+    let found = value.get(field).unwrap_or(&Value::Null);
+    match (found.as_bool(), found.as_f64()) {
+        (Some(flag), _) => Ok(flag),
+        (None, Some(0.0)) => Ok(false),
+        (None, Some(1.0)) => Ok(true),
+        _ => Err(format!("field `{field}` is {found}, not 0 or 1")),
+    }
 }
 
 /// Builds the arm in a world as the task does and asks the physics about it.
