@@ -1,6 +1,7 @@
 //! Whole-program stories: real processes, real sockets, real kills.
 
 mod bad_input;
+mod env_over_pipes;
 mod lost_replies;
 mod restart;
 mod resume;

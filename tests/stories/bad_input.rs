@@ -66,6 +66,7 @@ fn a_wrong_name_is_answered_with_the_nearest_right_one() {
         here,
         &["window-opne", "window-open"],
     );
+    expect(&["env", "push-gren"], here, &["push-gren", "push-green"]);
     expect(
         &["teach", "--run", "1", "--teacher", "orcale"],
         here,

@@ -5,6 +5,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 mod client;
+mod env;
 mod evaluate;
 mod experiment;
 mod export;
@@ -36,6 +37,7 @@ enum Command {
     Serve(serve::Args),
     Train(train::Args),
     Evaluate(evaluate::Args),
+    Env(env::Args),
     Teach(teach::Args),
     Render(render::Args),
     Golden(golden::Args),
@@ -73,6 +75,7 @@ pub fn main() -> ExitCode {
         Command::Serve(args) => serve::run(args),
         Command::Train(args) => train::run(args),
         Command::Evaluate(args) => evaluate::run(args),
+        Command::Env(args) => env::run(args),
         Command::Teach(args) => teach::run(args),
         Command::Render(args) => render::run(args),
         Command::Golden(args) => golden::run(&args),

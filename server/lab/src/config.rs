@@ -280,6 +280,11 @@ pub const PRESETS: &[(&str, &str, &str)] = &[
         include_str!("../../../assets/presets/task/window-open.toml"),
     ),
     (
+        "task",
+        "push-green",
+        include_str!("../../../assets/presets/task/push-green.toml"),
+    ),
+    (
         "quick",
         "go-fetch-return",
         include_str!("../../../assets/presets/quick/go-fetch-return.toml"),
@@ -288,6 +293,11 @@ pub const PRESETS: &[(&str, &str, &str)] = &[
         "quick",
         "window-open",
         include_str!("../../../assets/presets/quick/window-open.toml"),
+    ),
+    (
+        "quick",
+        "push-green",
+        include_str!("../../../assets/presets/quick/push-green.toml"),
     ),
 ];
 

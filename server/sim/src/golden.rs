@@ -4,7 +4,8 @@
 //! after a step and what the original made of it; the same [`crate::tasks::window_open::Readings`] are built
 //! from the line as from our physics, and observation, reward and success are compared. A
 //! *reset* line is checked in what the original reads freshly, a *trajectory* line in reward and
-//! success, its numbers being rounded more. Other lines are counted as skipped, with the reason.
+//! success, its numbers being rounded more. RoboDesk's lines say themselves what they are; those
+//! about its arm alone are put to the physics. Other lines are counted as skipped, with the reason.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -12,6 +13,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 mod metaworld;
+mod robodesk;
 
 /// Largest error of a reward and its parts that still counts as the same.
 pub const REWARD_TOLERANCE: f64 = 1e-6;
@@ -122,6 +124,13 @@ fn named(path: &Path, error: &io::Error) -> io::Error {
     io::Error::new(error.kind(), format!("{}: {error}", path.display()))
 }
 
+/// What earlier lines of a file say about later ones.
+#[derive(Debug, Default)]
+struct StepsBefore {
+    metaworld: metaworld::StepsBefore,
+    robodesk: robodesk::StepsBefore,
+}
+
 /// Replays recordings line by line; each file is a story of its own.
 #[derive(Debug, Default)]
 pub struct Replay {
@@ -148,7 +157,7 @@ impl Replay {
     /// Replays a file's bytes; `name` is what the report calls it, its stem the task where
     /// lines do not say theirs.
     pub fn text(&mut self, name: &str, text: &[u8]) {
-        let mut before = metaworld::StepsBefore::default();
+        let mut before = StepsBefore::default();
         for (index, line) in text.split(|byte| *byte == b'\n').enumerate() {
             if line.iter().all(u8::is_ascii_whitespace) {
                 continue;
@@ -166,7 +175,7 @@ impl Replay {
         &mut self,
         name: &str,
         line: &[u8],
-        before: &mut metaworld::StepsBefore,
+        before: &mut StepsBefore,
     ) -> Result<Option<Checks>, String> {
         let value: serde_json::Value =
             serde_json::from_slice(line).map_err(|error| format!("this is no JSON: {error}"))?;
@@ -184,20 +193,25 @@ impl Replay {
             Some(serde_json::Value::String(task)) => task.clone(),
             Some(other) => return Err(format!("\"task\" should be a name, not {other}")),
         };
+        if robodesk::knows(&task) {
+            let Some(kind) = robodesk::Kind::of(fields) else {
+                return Ok(self.skip(format!("{task}: its kind is not known")));
+            };
+            return robodesk::check(kind, &value, &mut before.robodesk).map(Some);
+        }
         if !metaworld::knows(&task) {
-            *self
-                .report
-                .skipped
-                .entry(format!("task {task} is not known"))
-                .or_default() += 1;
-            return Ok(None);
+            return Ok(self.skip(format!("task {task} is not known")));
         }
         let Some(kind) = metaworld::Kind::of(fields) else {
             let reason = format!("{task}: neither a transition, a reset nor a trajectory");
-            *self.report.skipped.entry(reason).or_default() += 1;
-            return Ok(None);
+            return Ok(self.skip(reason));
         };
-        metaworld::check(&task, kind, &value, before).map(Some)
+        metaworld::check(&task, kind, &value, &mut before.metaworld).map(Some)
+    }
+
+    fn skip(&mut self, reason: String) -> Option<Checks> {
+        *self.report.skipped.entry(reason).or_default() += 1;
+        None
     }
 
     fn count(&mut self, checks: &Checks, place: &str) {

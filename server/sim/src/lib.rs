@@ -8,5 +8,6 @@ pub mod expert;
 pub mod golden;
 pub mod reward;
 pub mod robots;
+pub mod solid;
 pub mod tasks;
 pub mod world;

@@ -1,5 +1,6 @@
 //! Bodies that act: what a task drives by its actions.
 
+pub mod panda;
 pub mod planar_robot;
 pub mod sawyer_fingers;
 pub mod sawyer_hand;

@@ -3,8 +3,10 @@
 use domain::environment::{EnvSpec, Environment};
 use domain::scene::{Frame, Scene};
 
+pub mod desk;
 pub mod go_fetch_return;
 pub mod metaworld;
+pub mod push_green;
 pub mod window;
 pub mod window_open;
 
@@ -32,7 +34,7 @@ pub struct Task {
 
 /// Every task, in the order in which lists show them.
 pub fn tasks() -> &'static [Task] {
-    const TASKS: &[Task] = &[go_fetch_return::TASK, window_open::TASK];
+    const TASKS: &[Task] = &[go_fetch_return::TASK, window_open::TASK, push_green::TASK];
     TASKS
 }
 

@@ -14,6 +14,10 @@ const TEXTS: &[(&str, &str)] = &[
         include_str!("../../../../assets/guidance/go-fetch-return.md"),
     ),
     (
+        "push-green",
+        include_str!("../../../../assets/guidance/push-green.md"),
+    ),
+    (
         "window-open",
         include_str!("../../../../assets/guidance/window-open.md"),
     ),

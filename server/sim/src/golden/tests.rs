@@ -41,6 +41,16 @@ fn the_recordings_of_the_originals_are_reproduced() {
     assert!(has("window-open v2 transitions", "observation 18-35"));
     assert!(has("window-open v3 resets", "observation 18-21"));
     assert!(has("window-open v2 trajectories", "reward"));
+    for field in [
+        "reward",
+        "success",
+        "observation 34-67",
+        "target, end effector",
+    ] {
+        assert!(has("push-green steps", field), "{field}");
+    }
+    assert!(has("push-green states", "success"));
+    assert!(has("panda kinematics", "inertia"));
 }
 
 #[test]
@@ -96,4 +106,46 @@ fn other_tasks_and_kinds_are_skipped_with_a_word() {
 fn a_path_that_is_not_there_is_named() {
     let error = find_recordings(&[PathBuf::from("no/such/folder")]).expect_err("it is not there");
     assert!(error.to_string().contains("no/such/folder"));
+}
+
+#[test]
+fn a_light_on_the_wrong_side_and_a_heavier_link_are_found() {
+    let lines = |file: &str| {
+        let path = repository().join("tests/golden").join(file);
+        fs::read_to_string(path).expect("the recording is part of the repository")
+    };
+    let states = lines("push-green.jsonl");
+    let mut state = states
+        .lines()
+        .map(|line| serde_json::from_str::<serde_json::Value>(line).expect("it is JSON"))
+        .find(|line| line["kind"] == "state")
+        .expect("some lines are states");
+    state["task"] = "push-green".into();
+    assert!(replay(&state.to_string()).is_within_tolerance());
+    let is_lit = state["reward_sparse"].as_f64() == Some(1.0);
+    state["light"] = if is_lit { 0.0 } else { -0.005 }.into();
+    let report = replay(&state.to_string());
+    let wrong = |field| {
+        report
+            .fields
+            .iter()
+            .find(|f| f.field == field)
+            .map(|f| !f.is_within_tolerance())
+    };
+    assert_eq!(wrong("success"), Some(true));
+
+    let mut arm: serde_json::Value = serde_json::from_str(
+        lines("panda_kinematics.jsonl")
+            .lines()
+            .next()
+            .expect("a line"),
+    )
+    .expect("it is JSON");
+    arm["task"] = "panda_kinematics".into();
+    assert!(replay(&arm.to_string()).is_within_tolerance());
+    arm["mass_matrix"][1][1] =
+        (arm["mass_matrix"][1][1].as_f64().expect("a number") * 1.001).into();
+    let report = replay(&arm.to_string());
+    let wrong = report.fields.iter().filter(|f| !f.is_within_tolerance());
+    assert_eq!(wrong.map(|f| f.field).collect::<Vec<_>>(), ["inertia"]);
 }
