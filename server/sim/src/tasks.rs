@@ -3,6 +3,7 @@
 use domain::environment::{EnvSpec, Environment};
 use domain::scene::{Frame, Scene};
 
+pub mod assembly;
 pub mod go_fetch_return;
 pub mod metaworld;
 pub mod window;

@@ -34,6 +34,8 @@ const SETTLING_STEPS: f64 = 20.0;
 const REACH_M: f64 = 0.89;
 const STRETCH: f64 = 0.35;
 const SHOULDER: Point = [0.0, 0.0, 0.317];
+/// From a finger's mounting to the origin of its pad, metres.
+const PAD_M: f64 = 0.003;
 
 /// Where a task's hand starts and may go.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -56,6 +58,21 @@ impl HandRange {
         lower: [-0.5, 0.40, 0.05],
         upper: [0.5, 1.0, 0.5],
     };
+    /// Over the middle of the table: door-open, drawer-open, sweep-into.
+    pub const FAR: Self = Self {
+        home: [0.0, 0.6, 0.2],
+        unsettled: [0.006_15, 0.000_19, -0.005_70],
+        ..Self::NEAR
+    };
+    /// This range, but as far down as the table itself lets the hand: door-unlock, faucet-open.
+    #[must_use]
+    pub const fn deep(self) -> Self {
+        let [x, y, _] = self.lower;
+        Self {
+            lower: [x, y, -0.15],
+            ..self
+        }
+    }
 }
 
 /// The hand of one episode; its body lives in the world it was built into.
@@ -67,6 +84,7 @@ pub struct SawyerHand {
     fingers: Fingers,
     range: HandRange,
     target: Point,
+    command: f64,
     n_steps: u32,
 }
 
@@ -97,6 +115,7 @@ impl SawyerHand {
             fingers,
             range,
             target: range.home,
+            command: -1.0,
             n_steps: 0,
         }
     }
@@ -108,7 +127,8 @@ impl SawyerHand {
         self.target = std::array::from_fn(|i| {
             (self.target[i] + ACTION_SCALE_M * action[i]).clamp(lower[i], upper[i])
         });
-        self.fingers.advance(action[3]);
+        self.command = action[3];
+        self.fingers.advance(self.command);
         for (handle, centre) in self
             .finger_colliders
             .iter()
@@ -151,6 +171,28 @@ impl SawyerHand {
         let right = [0.0, -0.05 + self.fingers.right(), 0.0];
         let left = [0.0, 0.05 + self.fingers.left(), 0.0];
         metaworld::openness(left, right)
+    }
+
+    /// Where the inner pads of the left and the right finger are, metres along y.
+    pub fn pads(&self, world: &PhysicsWorld) -> [f64; 2] {
+        let y = self.position(world)[1];
+        [
+            y + 0.05 + self.fingers.left() - PAD_M,
+            y - 0.05 + self.fingers.right() + PAD_M,
+        ]
+    }
+
+    /// The gripper command of the last step: +1 closes, −1 opens, as at the reset.
+    pub fn command(&self) -> f64 {
+        self.command
+    }
+
+    /// Whether palm or fingers are in contact with anything.
+    pub fn touches(&self, world: &PhysicsWorld) -> bool {
+        let colliders = world.bodies[self.body].colliders().iter();
+        colliders
+            .flat_map(|collider| world.contact_pairs_with(*collider))
+            .any(ContactPair::has_any_active_contact)
     }
 
     /// Both fingers.
