@@ -11,7 +11,8 @@ use crate::tasks::metaworld::{self, MOMENT_SIZE, OBSERVATION_SIZE, Point};
 
 mod objects;
 
-use objects::{Object, Recorded, Rebuilt, TASKS, TaskRecordings};
+use objects::{Object, Recorded};
+pub(super) use objects::{TASKS, TaskRecordings};
 
 /// Whether recordings of this task can be replayed.
 pub(super) fn knows(task: &str) -> bool {
@@ -101,15 +102,15 @@ struct Transition {
     r: f64,
     #[serde(deserialize_with = "yes_or_no")]
     success: bool,
-    #[serde(default, deserialize_with = "maybe_yes_or_no")]
-    near_object: Option<bool>,
+    #[serde(default, deserialize_with = "maybe_number")]
+    near_object: Option<f64>,
     grasp_reward: Option<f64>,
     in_place_reward: Option<f64>,
     obj_to_target: Option<f64>,
     hand: Point,
     tcp: Point,
-    lp: Point,
-    rp: Point,
+    lp: Option<Point>,
+    rp: Option<Point>,
     lc: Point,
     rc: Point,
     a: Vec<f64>,
@@ -168,8 +169,14 @@ fn yes_or_no<'de, D: Deserializer<'de>>(deserializer: D) -> Result<bool, D::Erro
     }
 }
 
-fn maybe_yes_or_no<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<bool>, D::Error> {
-    yes_or_no(deserializer).map(Some)
+/// A number, false or true.
+fn maybe_number<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<f64>, D::Error> {
+    let value = Value::deserialize(deserializer)?;
+    let number = value.as_bool().map(metaworld::yes).or(value.as_f64());
+    match number {
+        None => Err(D::Error::custom(format!("expected a number, not {value}"))),
+        number => Ok(number),
+    }
 }
 
 /// What earlier lines of a file say about later ones.
@@ -229,7 +236,10 @@ fn check_transition(
         hand: line.ver.shown(line.hand),
         tcp: line.tcp,
         openness: metaworld::openness(line.lc, line.rc),
-        pads: Some([line.lp[1], line.rp[1]]),
+        pads: line
+            .lp
+            .zip(line.rp)
+            .map(|(left, right)| [left[1], right[1]]),
         command: command(&line.a)?,
         newest_joint: first(&line.q, "q")?,
         object: Object::Joints(joints),
@@ -237,6 +247,7 @@ fn check_transition(
         obj_init: line.obj_init,
         init_tcp: line.init_tcp,
         handle_init: line.handle_init,
+        first_seen: None,
     })?;
     let step_before = before
         .last
@@ -249,10 +260,8 @@ fn check_transition(
     let judgement = rebuilt.judgement;
     checks.number("reward", judgement.reward, line.r, REWARD_TOLERANCE);
     checks.flag("success", judgement.success, line.success);
-    if let Some(near_object) = line.near_object {
-        checks.flag("near_object", judgement.near_object, near_object);
-    }
     let parts = [
+        ("near_object", judgement.near_object, line.near_object),
         ("grasp_reward", judgement.grasp_reward, line.grasp_reward),
         (
             "in_place_reward",
@@ -306,6 +315,7 @@ fn check_reset(task: &TaskRecordings, line: &Reset) -> Result<Checks, String> {
         obj_init: line.obj_init,
         init_tcp: line.init_tcp,
         handle_init: line.handle_init,
+        first_seen: None,
     })?;
     let ours = metaworld::observation(&rebuilt.moment, &rebuilt.moment);
     let mut checks = Checks::new(format!("{} {} resets", task.name, line.ver.name()));
@@ -369,7 +379,8 @@ fn check_trajectory(
         target: start.target,
         obj_init: start.obj_init,
         init_tcp: start.init_tcp,
-        handle_init: Some(start.object),
+        handle_init: None,
+        first_seen: Some(start.object),
     })?;
     let judgement = rebuilt.judgement;
     if !task.needs_pads {

@@ -5,7 +5,8 @@
 //! steps behind, as a mass on a damped spring of 8180 N/m.
 //!
 //! Differs from the original: the hand never tilts (there up to 4° in free motion, 2.3° per N·m), one gain
-//! serves all directions, and the fingers do not feel what they touch.
+//! serves all directions, and what pushes a finger reaches the hand whole, however the finger
+//! gives way.
 //! Source: METAWORLD.md 1.1, 1.5, 1.6.
 
 use domain::scene::{Geometry, Material, Shape, Transform};
@@ -82,6 +83,8 @@ pub struct SawyerHand {
     /// Right, left.
     finger_colliders: [ColliderHandle; 2],
     fingers: Fingers,
+    /// What pushes the right and the left finger along y, newtons.
+    finger_forces: [f64; 2],
     range: HandRange,
     target: Point,
     command: f64,
@@ -96,6 +99,7 @@ impl SawyerHand {
             .translation(vector(start))
             .lock_rotations()
             .additional_mass(MASS_KG as f32)
+            .gravity_scale(0.0)
             .can_sleep(false);
         let body = world.insert_body(body);
         let palm = ColliderBuilder::cuboid(0.033, 0.053, 0.027);
@@ -113,6 +117,7 @@ impl SawyerHand {
             body,
             finger_colliders,
             fingers,
+            finger_forces: [0.0; 2],
             range,
             target: range.home,
             command: -1.0,
@@ -128,7 +133,7 @@ impl SawyerHand {
             (self.target[i] + ACTION_SCALE_M * action[i]).clamp(lower[i], upper[i])
         });
         self.command = action[3];
-        self.fingers.advance(self.command);
+        self.fingers.advance(self.command, self.finger_forces);
         for (handle, centre) in self
             .finger_colliders
             .iter()
@@ -145,6 +150,13 @@ impl SawyerHand {
             - body.linvel() * (DRAG * MASS_KG) as f32;
         body.reset_forces(true);
         body.add_force(force, true);
+    }
+
+    /// Notes how hard the last step's contacts push the fingers, which give way to it in the next.
+    pub fn feel(&mut self, world: &PhysicsWorld) {
+        self.finger_forces = self
+            .finger_colliders
+            .map(|finger| f64::from(contact_force(world, finger).y));
     }
 
     /// Where the hand would come to rest, untouched.
@@ -210,6 +222,37 @@ fn within_reach(target: Point) -> Point {
     }
     let scale = (REACH_M + STRETCH * (distance - REACH_M)) / distance;
     std::array::from_fn(|i| SHOULDER[i] + scale * out[i])
+}
+
+/// What the contacts of a collider exerted on it in the last step, newtons.
+fn contact_force(world: &PhysicsWorld, collider: ColliderHandle) -> Vector {
+    let parameters = &world.integration_parameters;
+    let substep_s = parameters.dt / parameters.num_solver_iterations as f32;
+    let mut force = Vector::ZERO;
+    for pair in world.contact_pairs_with(collider) {
+        let is_first = pair.collider1 == collider;
+        let other = if is_first {
+            pair.collider2
+        } else {
+            pair.collider1
+        };
+        let is_jointed = world.colliders[other]
+            .parent()
+            .is_some_and(|body| world.multibody_joints.rigid_body_link(body).is_some());
+        // Between plain bodies rapier has one friction per manifold, told by each of its points.
+        let n_frictions = if is_jointed { usize::MAX } else { 1 };
+        let mut on_first = Vector::ZERO;
+        for manifold in pair.solver_manifolds() {
+            let points = || manifold.points.iter().map(|point| &point.data);
+            let normal = points().map(|data| data.impulse).sum::<f32>();
+            on_first -= manifold.data.normal * (normal / parameters.dt);
+            for data in points().take(n_frictions) {
+                on_first += data.warmstart_tangent_world / substep_s;
+            }
+        }
+        force += if is_first { on_first } else { -on_first };
+    }
+    force
 }
 
 /// Centres of the right and the left finger's box in the hand's frame (world axes), metres.
@@ -311,6 +354,7 @@ mod tests {
         for _ in 0..n {
             hand.drive(world, action);
             world.step();
+            hand.feel(world);
         }
     }
 
@@ -373,6 +417,25 @@ mod tests {
         }
         let moved_mm = (hand.position(&world)[1] - start) * 1000.0;
         assert!((moved_mm - 12.2).abs() < 0.3, "{moved_mm} mm");
+    }
+
+    /// The hand pressed onto the table and dragged along it: friction of 2 pulls both fingers
+    /// back with more than their springs hold.
+    #[test]
+    fn a_fist_dragged_over_the_table_opens_its_trailing_finger() {
+        let mut world = tabletop::world().physics;
+        tabletop::add_table(&mut world);
+        let mut hand = SawyerHand::new(&mut world, ACROSS.deep());
+        advance(&mut world, &mut hand, [0.0, 0.0, -1.0, 0.7], 24);
+        let closed = hand.fingers.right();
+        assert!((0.02..0.045).contains(&closed), "{closed}");
+        advance(&mut world, &mut hand, [0.0, 1.0, 0.0, 0.7], 20);
+        assert!(hand.fingers.right() < closed - 0.01, "{:?}", hand.fingers);
+        assert!(
+            (hand.fingers.left() + 0.03).abs() < 0.001,
+            "{:?}",
+            hand.fingers
+        );
     }
 
     #[test]

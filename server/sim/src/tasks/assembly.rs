@@ -163,7 +163,7 @@ pub struct Mover<'a> {
     /// Where its soft stops begin.
     pub limits: [f32; 2],
     /// How its stops give way.
-    pub stops: SpringCoefficients<f32>,
+    pub stops: Stops,
     /// Kilograms.
     pub mass_kg: f32,
     /// Centre of its mass in its own frame.
@@ -174,16 +174,36 @@ pub struct Mover<'a> {
     pub parts: &'a [Part],
 }
 
-/// MuJoCo's limits as the tasks feel them.
-///
-/// A limit there is a soft constraint with a time constant of 0.02 s and an impedance of 0.95:
-/// for a joint of inertia `I` a spring of `I · 0.95 / 0.05 / (0.95 · 0.02 s)² = 52 600 I` and a
-/// damper of `I · 0.95 / 0.05 · 2 / (0.95 · 0.02 s) = 2000 I`. Rapier's stops scale with the
-/// inertia as well; `ω² = 50 000 s⁻²` (what was measured) and `2 ζ ω = 2000 s⁻¹` make them the same.
-pub const SOFT_STOPS: SpringCoefficients<f32> = SpringCoefficients {
-    natural_frequency: 35.6,
-    damping_ratio: 4.5,
-};
+/// How the ends of a joint give way.
+#[derive(Debug, Clone, Copy)]
+pub enum Stops {
+    /// Like MuJoCo's joint limits.
+    ///
+    /// A limit there is a soft constraint with a time constant of 0.02 s and an impedance of
+    /// 0.95: for a joint of inertia `I` a spring of
+    /// `I · 0.95 / 0.05 / (0.95 · 0.02 s)² = 52 600 s⁻² · I` (measured: 50 000) and a damper of
+    /// `I · 0.95 / 0.05 · 2 / (0.95 · 0.02 s) = 2000 s⁻¹ · I`.
+    Soft,
+    /// In rapier's terms.
+    Own(SpringCoefficients<f32>),
+}
+
+impl Stops {
+    /// In rapier's terms, which are relative to the inertia that its solver sees: that of the
+    /// joint, and what its damping resists within a substep.
+    fn softness(self, inertia: f32) -> SpringCoefficients<f32> {
+        if let Self::Own(softness) = self {
+            return softness;
+        }
+        let (spring, damper) = (50_000.0 * inertia, 2000.0 * inertia);
+        let seen = inertia + DAMPING * tabletop::SUBSTEP_S;
+        let frequency = (spring / seen).sqrt();
+        SpringCoefficients {
+            natural_frequency: frequency / std::f32::consts::TAU,
+            damping_ratio: damper / (2.0 * frequency * seen),
+        }
+    }
+}
 
 const DAMPING: f32 = 2.0;
 const ARMATURE: f32 = 0.001;
@@ -257,7 +277,25 @@ impl MovingPart {
 }
 
 impl Mover<'_> {
+    /// What the joint has to set in motion, kg or kg·m².
+    fn joint_inertia(&self) -> f32 {
+        let [x, y, z] = self.centre_of_mass;
+        let own = match self.motion {
+            Motion::Slide(_) => self.mass_kg,
+            Motion::Hinge(along) => {
+                let square = match along {
+                    Along::X => y * y + z * z,
+                    Along::Y => x * x + z * z,
+                    Along::Z => x * x + y * y,
+                };
+                self.inertia + self.mass_kg * square
+            }
+        };
+        own + ARMATURE
+    }
+
     fn joint(&self, anchor: Vector) -> GenericJoint {
+        let softness = self.stops.softness(self.joint_inertia());
         let axis = |along| match along {
             Along::X => Vector::X,
             Along::Y => Vector::Y,
@@ -267,13 +305,13 @@ impl Mover<'_> {
             Motion::Slide(along) => PrismaticJointBuilder::new(axis(along))
                 .local_anchor1(anchor)
                 .limits(self.limits)
-                .softness(self.stops)
+                .softness(softness)
                 .build()
                 .into(),
             Motion::Hinge(along) => RevoluteJointBuilder::new(axis(along))
                 .local_anchor1(anchor)
                 .limits(self.limits)
-                .softness(self.stops)
+                .softness(softness)
                 .build()
                 .into(),
         }
@@ -283,4 +321,74 @@ impl Mover<'_> {
 /// A point as rapier has it.
 pub fn vector(p: Point) -> Vector {
     Vector::new(p[0] as f32, p[1] as f32, p[2] as f32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PART: Mover<'_> = Mover {
+        motion: Motion::Hinge(Along::Y),
+        limits: [-0.5, 0.5],
+        stops: Stops::Soft,
+        mass_kg: 1e-3,
+        centre_of_mass: [0.0; 3],
+        inertia: 1e-6,
+        parts: &[],
+    };
+
+    fn add(world: &mut PhysicsWorld, mover: &Mover<'_>, start: f32) -> MovingPart {
+        let base = add_fixed(world, [0.1, 0.2, 0.3], &[]);
+        MovingPart::add(world, base, [0.1, 0.5, 0.3], mover, start)
+    }
+
+    fn body(world: &PhysicsWorld) -> RigidBodyHandle {
+        let mut dynamic = world.bodies.iter().filter(|(_, body)| body.is_dynamic());
+        dynamic.next().expect("the part").0
+    }
+
+    #[test]
+    fn a_part_starts_where_it_is_told_to() {
+        let mut world = tabletop::world().physics;
+        let part = add(&mut world, &PART, 0.3);
+        assert!((part.position(&world) - 0.3).abs() < 1e-6);
+        let rotation = world.bodies[body(&world)].rotation();
+        assert!((rotation.y - 0.15_f32.sin()).abs() < 1e-6, "{rotation:?}");
+        let place = world.bodies[body(&world)].translation();
+        assert!(
+            (place - Vector::new(0.1, 0.5, 0.3)).length() < 1e-6,
+            "{place:?}"
+        );
+    }
+
+    /// METAWORLD.md 1.9: 50 N·m/rad for the lock, 19 kN/m for the drawer.
+    #[test]
+    fn stops_give_way_as_measured() {
+        let mut world = tabletop::world().physics;
+        let part = add(&mut world, &PART, 0.0);
+        let lever = body(&world);
+        world.bodies[lever].add_torque(Vector::new(0.0, 10.0, 0.0), true);
+        for _ in 0..200 {
+            world.step();
+        }
+        let beyond = part.position(&world) - 0.5;
+        assert!((beyond / 0.2 - 1.0).abs() < 0.1, "{beyond} rad at 10 N·m");
+
+        let mut world = tabletop::world().physics;
+        let drawer = Mover {
+            motion: Motion::Slide(Along::Y),
+            limits: [-0.16, 0.0],
+            mass_kg: 0.38,
+            inertia: 0.01,
+            ..PART
+        };
+        let part = add(&mut world, &drawer, 0.0);
+        let slid = body(&world);
+        world.bodies[slid].add_force(Vector::new(0.0, -400.0, 0.0), true);
+        for _ in 0..200 {
+            world.step();
+        }
+        let beyond = -0.16 - part.position(&world);
+        assert!((beyond / 0.021 - 1.0).abs() < 0.1, "{beyond} m at 400 N");
+    }
 }

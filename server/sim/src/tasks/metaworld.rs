@@ -6,7 +6,9 @@
 
 use std::fmt::Debug;
 
-use domain::environment::{EnvError, EnvSpec, Environment, EpisodeEnd, Step, TaskReward, checked_action};
+use domain::environment::{
+    EnvError, EnvSpec, Environment, EpisodeEnd, Step, TaskReward, checked_action,
+};
 use domain::random::Rng;
 use rapier3d::prelude::PhysicsWorld;
 use serde::de::DeserializeOwned;
@@ -170,6 +172,11 @@ pub struct Readings<Object> {
     pub object: Object,
 }
 
+/// 1 for yes, 0 for no.
+pub fn yes(flag: bool) -> f64 {
+    f64::from(u8::from(flag))
+}
+
 /// Ground truth about one step, with the parts of the reward that MetaWorld reports beside it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Judgement {
@@ -177,8 +184,8 @@ pub struct Judgement {
     pub reward: f64,
     /// Whether the task counts as solved at this step.
     pub success: bool,
-    /// Whether the hand is at the object.
-    pub near_object: bool,
+    /// Whether the hand is at the object: 1 or 0, in door-open something between.
+    pub near_object: f64,
     /// How well the hand is placed, in [0, 1].
     pub grasp_reward: f64,
     /// How well the object is placed, in [0, 1].
@@ -238,6 +245,7 @@ impl Episode {
             position.iter().all(|x| x.is_finite())
         };
         if self.world.step() && position_is_finite(self) {
+            self.hand.feel(&self.world.physics);
             return Ok(());
         }
         Err(EnvError::NotFinite {

@@ -8,7 +8,9 @@ use domain::scene::{Material, Scene, Transform};
 use rapier3d::prelude::{PhysicsWorld, SpringCoefficients};
 use serde::{Deserialize, Serialize};
 
-use super::assembly::{self, Along, Motion, Mover, MovingPart, Part, capsule, cuboid, cylinder};
+use super::assembly::{
+    self, Along, Motion, Mover, MovingPart, Part, Stops, capsule, cuboid, cylinder,
+};
 use super::metaworld::picture::{self, OBJECT_BODY};
 use super::metaworld::{Point, plus};
 use crate::robots::tabletop;
@@ -53,16 +55,16 @@ const SLIDING_PARTS: [Part; 11] = [
 /// How far the pane slides, metres.
 pub const TRAVEL_M: f64 = 0.2;
 
-/// The pane's own joint. Its stops are stiffer than [`assembly::SOFT_STOPS`], because in the
+/// The pane's own joint. Its stops are stiffer than [`Stops::Soft`], because in the
 /// original the pane also meets its frame: these hold it within 9 mm against the expert's 2 kN,
 /// at 2 mm in the end (there 2.7 and 1.3 mm).
 const PANE: Mover<'_> = Mover {
     motion: Motion::Slide(Along::X),
     limits: [0.0, TRAVEL_M as f32],
-    stops: SpringCoefficients {
+    stops: Stops::Own(SpringCoefficients {
         natural_frequency: 200.0,
         damping_ratio: 3.0,
-    },
+    }),
     mass_kg: 0.638,
     centre_of_mass: [0.0; 3],
     inertia: 0.01,
@@ -128,9 +130,7 @@ pub fn handle_at(root: Point, slide: f64, handle: Point) -> Point {
 /// The picture of both tasks: frame and pane, and the goal.
 pub fn scene() -> Scene {
     let fixed = FIXED_PARTS.iter().map(|part| part.shape(OBJECT_BODY));
-    let sliding = SLIDING_PARTS
-        .iter()
-        .map(|part| part.shape(OBJECT_BODY + 1));
+    let sliding = SLIDING_PARTS.iter().map(|part| part.shape(OBJECT_BODY + 1));
     picture::scene(
         tabletop::scenery(),
         fixed.chain(sliding).collect(),

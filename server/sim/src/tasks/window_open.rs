@@ -35,11 +35,11 @@ use domain::scene::{Frame, Scene};
 use rapier3d::prelude::PhysicsWorld;
 use serde::{Deserialize, Serialize};
 
+use super::Task;
 use super::metaworld::{
-    self, Judgement, MOMENT_SIZE, Point, Readings, Setup, distance, picture, plus,
+    self, Judgement, MOMENT_SIZE, Point, Readings, Setup, distance, picture, plus, yes,
 };
 use super::window::{self, Window, WindowReading, handle_at};
-use super::Task;
 use crate::reward::{Sigmoid, hamacher, tolerance};
 use crate::robots::sawyer_hand::HandRange;
 
@@ -115,7 +115,7 @@ impl Setup for WindowOpen {
         Judgement {
             reward: 10.0 * hamacher(reach, in_place),
             success: to_goal <= 0.05,
-            near_object: to_handle <= 0.05,
+            near_object: yes(to_handle <= 0.05),
             grasp_reward: reach,
             in_place_reward: in_place,
             obj_to_target: to_goal,
@@ -150,7 +150,9 @@ fn scene() -> Scene {
 /// The window's bodies and the goal: the original's is hidden inside the frame, this one is
 /// where the grip should get to.
 fn place(pose: &[f32]) -> Frame {
-    picture::place(pose, |window| window::place(window, window::TRAVEL_M as f32))
+    picture::place(pose, |window| {
+        window::place(window, window::TRAVEL_M as f32)
+    })
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 use domain::scene::{Arm, Frame, Geometry, Material, Scene, Shape, Transform};
 
+use super::Point;
 use crate::robots::sawyer_hand;
 use crate::robots::tabletop;
 
@@ -57,4 +58,10 @@ pub fn place<const N: usize>(pose: &[f32], object: fn(&[f32]) -> [Transform; N])
     let mut frame = sawyer_hand::place(hand).to_vec();
     frame.extend(object(rest));
     frame
+}
+
+/// An unturned frame at `point`.
+pub fn at(point: Point) -> Transform {
+    let [x, y, z] = point.map(|v| v as f32);
+    Transform::at(x, y, z)
 }
