@@ -241,7 +241,7 @@ fn check_transition(
             .zip(line.rp)
             .map(|(left, right)| [left[1], right[1]]),
         command: command(&line.a)?,
-        newest_joint: first(&line.q, "q")?,
+        newest: line.q.clone(),
         object: Object::Joints(joints),
         target: line.target,
         obj_init: line.obj_init,
@@ -309,7 +309,7 @@ fn check_reset(task: &TaskRecordings, line: &Reset) -> Result<Checks, String> {
         openness: metaworld::openness(line.lc, line.rc),
         pads: None,
         command: -1.0,
-        newest_joint: first(&line.q, "q")?,
+        newest: line.q.clone(),
         object: Object::Joints(line.q.clone()),
         target: line.target,
         obj_init: line.obj_init,
@@ -374,7 +374,7 @@ fn check_trajectory(
         openness: line.grip,
         pads: None,
         command: command(&line.a)?,
-        newest_joint: first(&line.q, "q")?,
+        newest: line.q.clone(),
         object: Object::Point(object),
         target: start.target,
         obj_init: start.obj_init,
@@ -402,11 +402,4 @@ fn observation_of(numbers: &[f64]) -> Result<[f64; OBSERVATION_SIZE], String> {
 fn command(action: &[f64]) -> Result<f64, String> {
     let command = action.get(3).ok_or("a has fewer than 4 numbers")?;
     Ok(command.clamp(-1.0, 1.0))
-}
-
-fn first(numbers: &[f64], name: &str) -> Result<f64, String> {
-    numbers
-        .first()
-        .copied()
-        .ok_or_else(|| format!("{name} has no number in it"))
 }

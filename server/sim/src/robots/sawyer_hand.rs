@@ -35,6 +35,12 @@ const SETTLING_STEPS: f64 = 20.0;
 const REACH_M: f64 = 0.89;
 const STRETCH: f64 = 0.35;
 const SHOULDER: Point = [0.0, 0.0, 0.317];
+/// How far a hard pull stretches the arm.
+const STRAIGHT_M: f64 = 0.93;
+/// Where the step response was measured.
+const MEASURED_AT: Point = [0.0, 0.6, 0.2];
+/// Bounds the drag of a stretched arm: a step of 12.5 ms would not carry more, m².
+const LEAST_SQUARE_LEFT: f64 = 0.2;
 /// From a finger's mounting to the origin of its pad, metres.
 const PAD_M: f64 = 0.003;
 
@@ -144,10 +150,14 @@ impl SawyerHand {
         }
 
         let rest = self.rest();
+        let out = outwards(self.position(world));
         self.n_steps += 1;
         let body = &mut world.bodies[self.body];
+        let velocity = body.linvel();
+        let (direction, drag) = (vector(out.direction), (out.drag - 1.0) as f32);
+        let dragged = velocity + direction * (drag * direction.dot(velocity));
         let force = (vector(rest) - body.translation()) * (PULL * MASS_KG) as f32
-            - body.linvel() * (DRAG * MASS_KG) as f32;
+            - dragged * (DRAG * MASS_KG) as f32;
         body.reset_forces(true);
         body.add_force(force, true);
     }
@@ -210,6 +220,29 @@ impl SawyerHand {
     /// Both fingers.
     pub fn fingers(&self) -> &Fingers {
         &self.fingers
+    }
+}
+
+/// Away from the shoulder.
+struct Outwards {
+    /// Unit vector.
+    direction: Point,
+    /// How much harder the hand moves along it than where its drag was measured; 1 or more.
+    drag: f64,
+}
+
+/// The drag of the arm's damped joints grows the straighter it is.
+///
+/// Two links of half the reach `R` that hold the hand at distance `r` turn their elbow by
+/// `2 / √(R² − r²)` radians for each metre outwards, so that their damping acts on the hand with
+/// the square of that.
+fn outwards(hand: Point) -> Outwards {
+    let square_left = |distance: f64| STRAIGHT_M * STRAIGHT_M - distance * distance;
+    let distance = metaworld::distance(hand, SHOULDER);
+    let measured = square_left(metaworld::distance(MEASURED_AT, SHOULDER));
+    Outwards {
+        direction: metaworld::minus(hand, SHOULDER).map(|x| x / distance),
+        drag: (measured / square_left(distance).max(LEAST_SQUARE_LEFT)).max(1.0),
     }
 }
 

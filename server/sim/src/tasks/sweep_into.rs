@@ -65,6 +65,8 @@ pub const TASK: Task = Task {
 pub struct Block {
     /// Its middle, `b`.
     pub position: Point,
+    /// Its quaternion, (x, y, z, w): not turned, but for millionths in recordings.
+    pub turn: [f64; 4],
     /// Its middle at the reset, `b₀`.
     pub start: Point,
 }
@@ -82,7 +84,9 @@ pub const GOAL: Point = [0.0, 0.84, 0.02];
 /// The original means the margins to stem from the pads at the reset, but its reference follows
 /// the pads, so that beyond 5 cm `beside` is a tenth, however far.
 fn caging(readings: &Readings<Block>) -> f64 {
-    let Block { position, start } = readings.object;
+    let Block {
+        position, start, ..
+    } = readings.object;
     let [left, right] = readings.pads;
     let outside = [left - position[1], position[1] - right];
     let both = |upper: f64| {
@@ -158,6 +162,7 @@ impl Setup for SweepInto {
         let p = world.bodies[self.block].translation();
         Block {
             position: [p.x, p.y, p.z].map(f64::from),
+            turn: [0.0, 0.0, 0.0, 1.0],
             start: self.start,
         }
     }
@@ -167,17 +172,14 @@ impl Setup for SweepInto {
     }
 
     fn moment(readings: &Readings<Block>) -> [f64; MOMENT_SIZE] {
-        let block = readings.object.position;
-        metaworld::moment(
-            readings.hand,
-            readings.openness,
-            block,
-            [0.0, 0.0, 0.0, 1.0],
-        )
+        let Block { position, turn, .. } = readings.object;
+        metaworld::moment(readings.hand, readings.openness, position, turn)
     }
 
     fn judge(readings: &Readings<Block>) -> Judgement {
-        let Block { position, start } = readings.object;
+        let Block {
+            position, start, ..
+        } = readings.object;
         let above_goal = [GOAL[0], GOAL[1], position[2]];
         let to_goal = distance(position, above_goal);
         let margin = distance(start, above_goal);

@@ -68,8 +68,8 @@ pub(super) struct Recorded {
     pub(super) openness: f64,
     pub(super) pads: Option<[f64; 2]>,
     pub(super) command: f64,
-    /// The joint at the end of the step.
-    pub(super) newest_joint: f64,
+    /// The joint at the end of the step; without one, position and quaternion.
+    pub(super) newest: Vec<f64>,
     pub(super) object: Object,
     pub(super) target: Point,
     pub(super) obj_init: Option<Point>,
@@ -164,7 +164,7 @@ fn door(recorded: &Recorded) -> Placed<Door> {
     let root = minus(recorded.target, door_open::goal([0.0; 3]));
     let reading = Door {
         root,
-        angle: recorded.newest_joint,
+        angle: *recorded.newest.first().ok_or("q is empty")?,
         seen_angle: recorded.joint(|point| door_open::angle_of(root, point))?,
     };
     Ok((root, reading))
@@ -195,5 +195,15 @@ fn block(recorded: &Recorded) -> Placed<Block> {
         Object::Joints(joints) => *joints.first_chunk().ok_or("q has fewer than 3 numbers")?,
         Object::Point(point) => *point,
     };
-    Ok((start, Block { position, start }))
+    // It hardly turns: as little within a substep as to make no difference.
+    let [w, x, y, z] = *recorded
+        .newest
+        .last_chunk()
+        .ok_or("q has fewer than 4 numbers")?;
+    let reading = Block {
+        position,
+        turn: [x, y, z, w],
+        start,
+    };
+    Ok((start, reading))
 }

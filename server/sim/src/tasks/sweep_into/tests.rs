@@ -14,6 +14,7 @@ fn example() -> Readings<Block> {
         init_tcp: [0.006_00, 0.600_48, 0.149_35],
         object: Block {
             position: [0.002_308, 0.782_583, 0.069_951],
+            turn: [0.0, 0.0, 0.0, 1.0],
             start: [0.008_68, 0.627_84, 0.069_94],
         },
     }
@@ -47,7 +48,9 @@ fn a_block_left_alone_stays_where_it_lies() {
     for _ in 0..200 {
         environment.step(&[0.0; 4]).expect("a valid action");
     }
-    let Block { position, start } = environment.readings().object;
+    let Block {
+        position, start, ..
+    } = environment.readings().object;
     assert!(distance(position, start) < 1e-3, "{position:?}, {start:?}");
 }
 
