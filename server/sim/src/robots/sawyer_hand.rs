@@ -41,6 +41,9 @@ const STRAIGHT_M: f64 = 0.93;
 const MEASURED_AT: Point = [0.0, 0.6, 0.2];
 /// Bounds the drag of a stretched arm: a step of 12.5 ms would not carry more, m².
 const LEAST_SQUARE_LEFT: f64 = 0.2;
+/// Half extents of the gripper's body, whose edges are rounded.
+const PALM_HALF_M: [f32; 3] = [0.033, 0.053, 0.027];
+const PALM_EDGE_M: f32 = 0.02;
 /// From a finger's mounting to the origin of its pad, metres.
 const PAD_M: f64 = 0.003;
 
@@ -108,7 +111,8 @@ impl SawyerHand {
             .gravity_scale(0.0)
             .can_sleep(false);
         let body = world.insert_body(body);
-        let palm = ColliderBuilder::cuboid(0.033, 0.053, 0.027);
+        let [x, y, z] = PALM_HALF_M.map(|half| half - PALM_EDGE_M);
+        let palm = ColliderBuilder::round_cuboid(x, y, z, PALM_EDGE_M);
         let palm = tabletop::collider(palm, [-0.009, 0.0, 0.066], Layer::Hand).density(0.0);
         world.insert_collider(palm, Some(body));
         let fingers = Fingers::open();
@@ -337,12 +341,7 @@ pub fn shapes() -> Vec<Shape> {
     let palm = upright.then(Transform::at(-0.009, 0.0, 0.066));
     let rail = upright.then(Transform::at(0.0, 0.0, 0.05));
     let mut shapes = vec![
-        cuboid(
-            HAND_BODY,
-            palm,
-            [0.033, 0.053, 0.027],
-            Material::plain(0.5, 0.1, 0.1),
-        ),
+        cuboid(HAND_BODY, palm, PALM_HALF_M, Material::plain(0.5, 0.1, 0.1)),
         cuboid(
             HAND_BODY,
             rail,
