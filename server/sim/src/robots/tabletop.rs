@@ -135,6 +135,16 @@ pub fn add_table_with_hole(world: &mut PhysicsWorld) {
     }
 }
 
+/// Height of the floor, metres.
+const FLOOR_Z: f32 = -0.913;
+
+/// Adds the floor, for what may fall off the table.
+pub fn add_floor(world: &mut PhysicsWorld) {
+    let floor = ColliderBuilder::cuboid(4.0, 4.0, 0.5);
+    let centre = [0.0, 0.0, FLOOR_Z - 0.5];
+    world.insert_collider(collider(floor, centre, Layer::Fixed), None);
+}
+
 /// The table with a hole, floor and the robot's pedestal, all on body 0.
 pub fn scenery_with_hole() -> Vec<Shape> {
     let mut shapes = floor_and_pedestal();
@@ -151,7 +161,7 @@ fn floor_and_pedestal() -> Vec<Shape> {
     };
     let black = Material::plain(0.2, 0.2, 0.2);
     vec![
-        fixed_box([4.0, 4.0, 0.01], [0.0, 0.0, -0.923], TILES),
+        fixed_box([4.0, 4.0, 0.01], [0.0, 0.0, FLOOR_Z - 0.01], TILES),
         fixed_box([0.11, 0.2, 0.265], [-0.325, 0.0, -0.38], black),
         fixed_box([0.385, 0.35, 0.155], [-0.1225, 0.0, -0.758], black),
         Shape {

@@ -63,3 +63,18 @@ fn a_block_over_the_hole_falls_in_and_comes_to_rest_at_the_bottom() {
     let z = environment.readings().object.position[2];
     assert!((z - 0.02).abs() < 0.001, "{z}");
 }
+
+/// The fist presses the block against the rim of the hole with hundreds of newtons.
+#[test]
+fn the_expert_never_pushes_the_block_through_the_table() {
+    let mut environment = Simulation::<SweepInto>::new();
+    for seed in 0..20 {
+        let mut observation = environment.reset(seed);
+        for _ in 0..500 {
+            let step = environment.step(&expert(&observation));
+            observation = step.expect("the expert's actions fit").observation;
+        }
+        let Block { position, .. } = environment.readings().object;
+        assert!(position[2] > 0.0, "seed {seed}: {position:?}");
+    }
+}
