@@ -208,7 +208,10 @@ mod tests {
         };
         let table = dynamics_table(&[report]);
         assert!(table.contains("-1.000 (-2.000)"), "{table}");
-        assert!(table.contains("50.0 %  further than 10 mm or 15 %"), "{table}");
+        assert!(
+            table.contains("50.0 %  further than 10 mm or 15 %"),
+            "{table}"
+        );
     }
 
     #[test]

@@ -66,7 +66,8 @@ const fn reference(task: &'static str, figures: [Figures; 3]) -> Reference {
     }
 }
 
-/// The seven tasks; the bounds are those that METAWORLD_EXPERTS.md suggests.
+/// The seven tasks; the bounds are those that METAWORLD_EXPERTS.md suggests, but where a comment
+/// says why not.
 pub const REFERENCES: [Reference; 7] = [
     Reference {
         expert_return: 0.35,
@@ -98,7 +99,10 @@ pub const REFERENCES: [Reference; 7] = [
             ],
         )
     },
+    // Here friction holds still: the hand stays where the lever is turned. There contacts creep,
+    // and after 3 to 4 seconds the hand slips in, pushes the lever back and has to start anew.
     Reference {
+        expert_return: 0.25,
         random_return: 0.4,
         ..reference(
             "door-unlock",

@@ -46,6 +46,8 @@ fn the_recordings_of_the_originals_are_reproduced() {
     }
 }
 
+/// One expert's episode of each task. Others can end elsewhere: where a fist slips off a handle,
+/// a millimetre decides.
 #[test]
 fn our_physics_follows_the_recorded_actions() {
     let mut replay = Replay::new();

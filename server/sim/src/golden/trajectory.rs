@@ -149,7 +149,7 @@ fn replay_one(episode: &[Line]) -> Result<DynamicsReport, String> {
         .collect::<Result<_, _>>()?;
 
     // Contact shows here in the contacts, there in an object that moves.
-    let moves = |object: f64| (object - theirs[0]).abs() > 1e-3 * task.travel;
+    let moves = |object: f64| (object - theirs[0]).abs() > 0.01 * task.travel;
     let is_free = |t: &usize| !ours[*t].hand_touches && !moves(theirs[*t]);
     let n_free = (0..episode.len()).take_while(is_free).count();
     let squares = (0..n_free).map(|t| distance(ours[t].hand, episode[t].hand).powi(2));
