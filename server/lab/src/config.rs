@@ -271,8 +271,38 @@ pub const PRESETS: &[(&str, &str, &str)] = &[
     ),
     (
         "task",
+        "door-open",
+        include_str!("../../../assets/presets/task/door-open.toml"),
+    ),
+    (
+        "task",
+        "door-unlock",
+        include_str!("../../../assets/presets/task/door-unlock.toml"),
+    ),
+    (
+        "task",
+        "drawer-open",
+        include_str!("../../../assets/presets/task/drawer-open.toml"),
+    ),
+    (
+        "task",
+        "faucet-open",
+        include_str!("../../../assets/presets/task/faucet-open.toml"),
+    ),
+    (
+        "task",
         "go-fetch-return",
         include_str!("../../../assets/presets/task/go-fetch-return.toml"),
+    ),
+    (
+        "task",
+        "sweep-into",
+        include_str!("../../../assets/presets/task/sweep-into.toml"),
+    ),
+    (
+        "task",
+        "window-close",
+        include_str!("../../../assets/presets/task/window-close.toml"),
     ),
     (
         "task",
@@ -286,8 +316,38 @@ pub const PRESETS: &[(&str, &str, &str)] = &[
     ),
     (
         "quick",
+        "door-open",
+        include_str!("../../../assets/presets/quick/door-open.toml"),
+    ),
+    (
+        "quick",
+        "door-unlock",
+        include_str!("../../../assets/presets/quick/door-unlock.toml"),
+    ),
+    (
+        "quick",
+        "drawer-open",
+        include_str!("../../../assets/presets/quick/drawer-open.toml"),
+    ),
+    (
+        "quick",
+        "faucet-open",
+        include_str!("../../../assets/presets/quick/faucet-open.toml"),
+    ),
+    (
+        "quick",
         "go-fetch-return",
         include_str!("../../../assets/presets/quick/go-fetch-return.toml"),
+    ),
+    (
+        "quick",
+        "sweep-into",
+        include_str!("../../../assets/presets/quick/sweep-into.toml"),
+    ),
+    (
+        "quick",
+        "window-close",
+        include_str!("../../../assets/presets/quick/window-close.toml"),
     ),
     (
         "quick",

@@ -1,19 +1,25 @@
 //! Replays recordings of the original environments through the functions that ours call.
 //!
 //! A recording is a file of JSON Lines. A *transition* holds what the original's physics said
-//! after a step and what the original made of it; the same [`crate::tasks::window_open::Readings`] are built
+//! after a step and what the original made of it; the same
+//! [`Readings`](crate::tasks::metaworld::Readings) are built
 //! from the line as from our physics, and observation, reward and success are compared. A
 //! *reset* line is checked in what the original reads freshly, a *trajectory* line in reward and
-//! success, its numbers being rounded more. RoboDesk's lines say themselves what they are; those
-//! about its arm alone are put to the physics. Other lines are counted as skipped, with the reason.
+//! success, its numbers being rounded more; the actions of a whole trajectory are also played in
+//! our physics. RoboDesk's lines say themselves what they are; those about its arm alone are put
+//! to the physics. Other lines are counted as skipped, with the reason.
 
 use std::collections::BTreeMap;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
+pub mod figures;
 mod metaworld;
 mod robodesk;
+pub mod trajectory;
+
+use trajectory::DynamicsReport;
 
 /// Largest error of a reward and its parts that still counts as the same.
 pub const REWARD_TOLERANCE: f64 = 1e-6;
@@ -51,6 +57,8 @@ impl FieldReport {
 pub struct Report {
     /// One entry per recording and field, recordings in order of name.
     pub fields: Vec<FieldReport>,
+    /// One entry per trajectory, in the order of the files.
+    pub dynamics: Vec<DynamicsReport>,
     /// Lines of no known kind: why, and how many.
     pub skipped: BTreeMap<String, usize>,
     /// Lines that could not be read, with file and line number.
@@ -60,7 +68,8 @@ pub struct Report {
 }
 
 impl Report {
-    /// Whether every compared number is within its tolerance.
+    /// Whether every compared number is within its tolerance. Dynamics do not enter: what two
+    /// engines make of one contact is told, not judged.
     pub fn is_within_tolerance(&self) -> bool {
         self.fields.iter().all(FieldReport::is_within_tolerance)
     }
@@ -158,16 +167,21 @@ impl Replay {
     /// lines do not say theirs.
     pub fn text(&mut self, name: &str, text: &[u8]) {
         let mut before = StepsBefore::default();
+        let mut trajectories = Vec::new();
         for (index, line) in text.split(|byte| *byte == b'\n').enumerate() {
             if line.iter().all(u8::is_ascii_whitespace) {
                 continue;
             }
             let place = format!("{name}:{}", index + 1);
-            match self.line(name, line, &mut before) {
+            match self.line(name, line, &mut before, &mut trajectories) {
                 Ok(Some(checks)) => self.count(&checks, &place),
                 Ok(None) => {}
                 Err(reason) => self.report.malformed.push(format!("{place}: {reason}")),
             }
+        }
+        match trajectory::replay_all(&trajectories) {
+            Ok(dynamics) => self.report.dynamics.extend(dynamics),
+            Err(reason) => self.report.malformed.push(format!("{name}: {reason}")),
         }
     }
 
@@ -176,6 +190,7 @@ impl Replay {
         name: &str,
         line: &[u8],
         before: &mut StepsBefore,
+        trajectories: &mut Vec<trajectory::Line>,
     ) -> Result<Option<Checks>, String> {
         let value: serde_json::Value =
             serde_json::from_slice(line).map_err(|error| format!("this is no JSON: {error}"))?;
@@ -206,7 +221,11 @@ impl Replay {
             let reason = format!("{task}: neither a transition, a reset nor a trajectory");
             return Ok(self.skip(reason));
         };
-        metaworld::check(&task, kind, &value, &mut before.metaworld).map(Some)
+        let checks = metaworld::check(&task, kind, &value, &mut before.metaworld)?;
+        if kind == metaworld::Kind::Trajectory {
+            trajectories.push(trajectory::Line::read(&value, &task)?);
+        }
+        Ok(Some(checks))
     }
 
     fn skip(&mut self, reason: String) -> Option<Checks> {

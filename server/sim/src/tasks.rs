@@ -3,11 +3,19 @@
 use domain::environment::{EnvSpec, Environment};
 use domain::scene::{Frame, Scene};
 
+pub mod assembly;
+pub mod cabinet;
 pub mod desk;
+pub mod door_open;
+pub mod door_unlock;
+pub mod drawer_open;
+pub mod faucet_open;
 pub mod go_fetch_return;
 pub mod metaworld;
 pub mod push_green;
+pub mod sweep_into;
 pub mod window;
+pub mod window_close;
 pub mod window_open;
 
 /// A task as the rest of the program knows it.
@@ -34,7 +42,17 @@ pub struct Task {
 
 /// Every task, in the order in which lists show them.
 pub fn tasks() -> &'static [Task] {
-    const TASKS: &[Task] = &[go_fetch_return::TASK, window_open::TASK, push_green::TASK];
+    const TASKS: &[Task] = &[
+        go_fetch_return::TASK,
+        window_open::TASK,
+        window_close::TASK,
+        door_open::TASK,
+        door_unlock::TASK,
+        drawer_open::TASK,
+        faucet_open::TASK,
+        sweep_into::TASK,
+        push_green::TASK,
+    ];
     TASKS
 }
 

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use sim::golden::trajectory::{DynamicsReport, HAND_TOLERANCE_M, OBJECT_TOLERANCE};
 use sim::golden::{FieldReport, Replay, Report, find_recordings};
 
 use super::BadInput;
@@ -10,8 +11,10 @@ use super::BadInput;
 /// Replay recordings of the original environments through this program's observation, reward
 /// and success functions.
 ///
-/// Prints the largest error of each field. Ends with code 1 when a field is past its tolerance
-/// (rewards 1e-6, observations 1e-5, success exact) and 2 when a line or a path cannot be read.
+/// Prints the largest error of each field, and for whole trajectories how our physics follows the
+/// recorded actions: the hand until it touches something (10 mm), the object at the end of an
+/// expert's episode (15 % of its travel). Ends with code 1 when a field is past its tolerance
+/// (rewards 1e-6, observations 1e-5, success exact; the physics are only told) and 2 when a line or a path cannot be read.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   stair golden tests/golden
@@ -40,6 +43,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     }
     let report = replay.finish();
     print!("{}", table(&report.fields));
+    print!("{}", dynamics_table(&report.dynamics));
     for (reason, n_lines) in &report.skipped {
         println!("skipped {n_lines} lines: {reason}");
     }
@@ -93,12 +97,48 @@ fn table(fields: &[FieldReport]) -> String {
         "tolerance",
         "",
     ];
-    if fields.is_empty() {
+    aligned(HEAD, fields.iter().map(row).collect())
+}
+
+/// Trajectory, steps and error of the free hand, object here and there, error, verdict; aligned.
+fn dynamics_table(reports: &[DynamicsReport]) -> String {
+    const HEAD: [&str; 6] = [
+        "trajectory",
+        "object here (there)",
+        "free steps",
+        "hand rms",
+        "object off",
+        "",
+    ];
+    aligned(HEAD, reports.iter().map(dynamics_row).collect())
+}
+
+fn dynamics_row(report: &DynamicsReport) -> [String; 6] {
+    let [here, there] = report.object;
+    let verdict = if report.is_within_tolerance() {
+        "ok".into()
+    } else {
+        let (hand_mm, share) = (1e3 * HAND_TOLERANCE_M, 100.0 * OBJECT_TOLERANCE);
+        format!("further than {hand_mm:.0} mm or {share:.0} %")
+    };
+    [
+        report.recording.clone(),
+        format!("{here:.3} ({there:.3})"),
+        report.n_free.to_string(),
+        format!("{:.1} mm", 1e3 * report.hand_rms_m),
+        format!("{:.1} %", 100.0 * report.object_error()),
+        verdict,
+    ]
+}
+
+/// Rows under a head, two columns to the left and three to the right, the last as it comes.
+fn aligned(head: [&str; 6], rows: Vec<[String; 6]>) -> String {
+    if rows.is_empty() {
         return String::new();
     }
-    let mut rows = vec![HEAD.map(String::from)];
-    rows.extend(fields.iter().map(row));
-    let width = |column: usize| rows.iter().map(|r| r[column].chars().count()).max();
+    let mut lines = vec![head.map(String::from)];
+    lines.extend(rows);
+    let width = |column: usize| lines.iter().map(|r| r[column].chars().count()).max();
     let widths: [usize; 5] = std::array::from_fn(|column| width(column).unwrap_or(0));
     let line = |r: &[String; 6]| {
         let [a, b, c, d, e] = widths;
@@ -108,7 +148,7 @@ fn table(fields: &[FieldReport]) -> String {
         );
         format!("{}\n", text.trim_end())
     };
-    rows.iter().map(line).collect()
+    lines.iter().map(line).collect()
 }
 
 fn row(field: &FieldReport) -> [String; 6] {
@@ -154,6 +194,24 @@ mod tests {
             "0 lines of 1 files compared, 1 line could not be read"
         );
         assert_eq!(exit_code(&report), ExitCode::from(2));
+    }
+
+    #[test]
+    fn a_trajectory_that_our_physics_does_not_follow_is_marked() {
+        let report = DynamicsReport {
+            recording: "door-open v2 expert, seed 300".into(),
+            is_expert: true,
+            n_free: 20,
+            hand_rms_m: 0.004,
+            object: [-1.0, -2.0],
+            travel: 2.0,
+        };
+        let table = dynamics_table(&[report]);
+        assert!(table.contains("-1.000 (-2.000)"), "{table}");
+        assert!(
+            table.contains("50.0 %  further than 10 mm or 15 %"),
+            "{table}"
+        );
     }
 
     #[test]

@@ -10,12 +10,36 @@ use sha2::{Digest as _, Sha256};
 /// `(task, text)`.
 const TEXTS: &[(&str, &str)] = &[
     (
+        "door-open",
+        include_str!("../../../../assets/guidance/door-open.md"),
+    ),
+    (
+        "door-unlock",
+        include_str!("../../../../assets/guidance/door-unlock.md"),
+    ),
+    (
+        "drawer-open",
+        include_str!("../../../../assets/guidance/drawer-open.md"),
+    ),
+    (
+        "faucet-open",
+        include_str!("../../../../assets/guidance/faucet-open.md"),
+    ),
+    (
         "go-fetch-return",
         include_str!("../../../../assets/guidance/go-fetch-return.md"),
     ),
     (
         "push-green",
         include_str!("../../../../assets/guidance/push-green.md"),
+    ),
+    (
+        "sweep-into",
+        include_str!("../../../../assets/guidance/sweep-into.md"),
+    ),
+    (
+        "window-close",
+        include_str!("../../../../assets/guidance/window-close.md"),
     ),
     (
         "window-open",

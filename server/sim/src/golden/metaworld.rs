@@ -7,18 +7,16 @@ use serde::{Deserialize, Deserializer};
 use serde_json::{Map, Value};
 
 use super::{Checks, OBSERVATION_TOLERANCE, REWARD_TOLERANCE, TRAJECTORY_TOLERANCE};
-use crate::tasks::metaworld::{self, Judgement, MOMENT_SIZE, OBSERVATION_SIZE, Point};
-use crate::tasks::{window, window_open};
+use crate::tasks::metaworld::{self, MOMENT_SIZE, OBSERVATION_SIZE, Point};
 
-/// Turns what was recorded into what the task makes of it.
-type Rebuild = fn(&Recorded) -> Result<Rebuilt, String>;
+mod objects;
 
-/// The tasks whose recordings can be replayed. One line here makes a task's recordings known.
-const TASKS: [(&str, Rebuild); 1] = [("window-open", rebuild_window_open)];
+use objects::{Object, Recorded};
+pub(super) use objects::{TASKS, TaskRecordings};
 
 /// Whether recordings of this task can be replayed.
 pub(super) fn knows(task: &str) -> bool {
-    TASKS.iter().any(|(name, _)| *name == task)
+    TASKS.iter().any(|known| known.name == task)
 }
 
 /// What a line holds.
@@ -104,18 +102,22 @@ struct Transition {
     r: f64,
     #[serde(deserialize_with = "yes_or_no")]
     success: bool,
-    #[serde(default, deserialize_with = "maybe_yes_or_no")]
-    near_object: Option<bool>,
+    #[serde(default, deserialize_with = "maybe_number")]
+    near_object: Option<f64>,
     grasp_reward: Option<f64>,
     in_place_reward: Option<f64>,
     obj_to_target: Option<f64>,
     hand: Point,
     tcp: Point,
+    lp: Option<Point>,
+    rp: Option<Point>,
     lc: Point,
     rc: Point,
+    a: Vec<f64>,
     q: Vec<f64>,
     qd: Vec<f64>,
     target: Point,
+    obj_init: Option<Point>,
     init_tcp: Point,
     handle_init: Option<Point>,
 }
@@ -130,6 +132,7 @@ struct Reset {
     rc: Point,
     q: Vec<f64>,
     target: Point,
+    obj_init: Option<Point>,
     init_tcp: Point,
     handle_init: Option<Point>,
     rand_vec: Vec<f64>,
@@ -145,10 +148,13 @@ struct TrajectoryStep {
     grip: f64,
     obj: Vec<f64>,
     tcp: Point,
+    a: Vec<f64>,
+    q: Vec<f64>,
     r: f64,
     #[serde(deserialize_with = "yes_or_no")]
     success: bool,
     target: Option<Point>,
+    obj_init: Option<Point>,
     init_tcp: Option<Point>,
 }
 
@@ -163,57 +169,14 @@ fn yes_or_no<'de, D: Deserializer<'de>>(deserializer: D) -> Result<bool, D::Erro
     }
 }
 
-fn maybe_yes_or_no<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<bool>, D::Error> {
-    yes_or_no(deserializer).map(Some)
-}
-
-/// The recorded side of a task's readings.
-struct Recorded {
-    hand: Point,
-    tcp: Point,
-    openness: f64,
-    object: Object,
-    target: Point,
-    init_tcp: Point,
-    handle_init: Option<Point>,
-}
-
-/// Where the object is, as far as the line tells.
-enum Object {
-    /// Its joint, at the time of the positions.
-    Joint(f64),
-    /// Its point of the observation.
-    Point(Point),
-}
-
-/// The task's side.
-struct Rebuilt {
-    root: Point,
-    moment: [f64; MOMENT_SIZE],
-    judgement: Judgement,
-}
-
-fn rebuild_window_open(recorded: &Recorded) -> Result<Rebuilt, String> {
-    let goal = window_open::goal([0.0; 3]);
-    let root: Point = std::array::from_fn(|i| recorded.target[i] - goal[i]);
-    let slide = match recorded.object {
-        Object::Joint(slide) => slide,
-        Object::Point(handle) => handle[0] - window::handle(root, 0.0)[0],
-    };
-    let readings = window_open::Readings {
-        hand: recorded.hand,
-        tcp: recorded.tcp,
-        openness: recorded.openness,
-        root,
-        slide,
-        init_tcp: recorded.init_tcp,
-        init_handle: recorded.handle_init.ok_or("missing field `handle_init`")?,
-    };
-    Ok(Rebuilt {
-        root,
-        moment: readings.moment(),
-        judgement: readings.judge(),
-    })
+/// A number, false or true.
+fn maybe_number<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<f64>, D::Error> {
+    let value = Value::deserialize(deserializer)?;
+    let number = value.as_bool().map(metaworld::yes).or(value.as_f64());
+    match number {
+        None => Err(D::Error::custom(format!("expected a number, not {value}"))),
+        number => Ok(number),
+    }
 }
 
 /// What earlier lines of a file say about later ones.
@@ -235,6 +198,7 @@ struct Remembered {
 #[derive(Debug)]
 struct Start {
     target: Point,
+    obj_init: Option<Point>,
     init_tcp: Point,
     object: Point,
 }
@@ -246,13 +210,13 @@ pub(super) fn check(
     line: &Value,
     before: &mut StepsBefore,
 ) -> Result<Checks, String> {
-    let Some((_, rebuild)) = TASKS.iter().find(|(name, _)| *name == task) else {
+    let Some(task) = TASKS.iter().find(|known| known.name == task) else {
         return Err(format!("task {task} is not known"));
     };
     match kind {
-        Kind::Transition => check_transition(task, *rebuild, &read(line)?, before),
-        Kind::Reset => check_reset(task, *rebuild, &read(line)?),
-        Kind::Trajectory => check_trajectory(task, *rebuild, &read(line)?, before),
+        Kind::Transition => check_transition(task, &read(line)?, before),
+        Kind::Reset => check_reset(task, &read(line)?),
+        Kind::Trajectory => check_trajectory(task, &read(line)?, before),
     }
 }
 
@@ -261,21 +225,29 @@ fn read<T: serde::de::DeserializeOwned>(line: &Value) -> Result<T, String> {
 }
 
 fn check_transition(
-    task: &str,
-    rebuild: Rebuild,
+    task: &TaskRecordings,
     line: &Transition,
     before: &mut StepsBefore,
 ) -> Result<Checks, String> {
     let theirs = observation_of(&line.obs)?;
-    let (q, qd) = (first(&line.q, "q")?, first(&line.qd, "qd")?);
-    let rebuilt = rebuild(&Recorded {
+    let before_substep = |(q, qd): (&f64, &f64)| q - line.ver.lag_s() * qd;
+    let joints = line.q.iter().zip(&line.qd).map(before_substep).collect();
+    let rebuilt = (task.rebuild)(&Recorded {
         hand: line.ver.shown(line.hand),
         tcp: line.tcp,
         openness: metaworld::openness(line.lc, line.rc),
-        object: Object::Joint(q - line.ver.lag_s() * qd),
+        pads: line
+            .lp
+            .zip(line.rp)
+            .map(|(left, right)| [left[1], right[1]]),
+        command: command(&line.a)?,
+        newest: line.q.clone(),
+        object: Object::Joints(joints),
         target: line.target,
+        obj_init: line.obj_init,
         init_tcp: line.init_tcp,
         handle_init: line.handle_init,
+        first_seen: None,
     })?;
     let step_before = before
         .last
@@ -284,14 +256,12 @@ fn check_transition(
         .map(|last| last.moment);
     let ours = metaworld::observation(&rebuilt.moment, &step_before.unwrap_or(rebuilt.moment));
 
-    let mut checks = Checks::new(format!("{task} {} transitions", line.ver.name()));
+    let mut checks = Checks::new(format!("{} {} transitions", task.name, line.ver.name()));
     let judgement = rebuilt.judgement;
     checks.number("reward", judgement.reward, line.r, REWARD_TOLERANCE);
     checks.flag("success", judgement.success, line.success);
-    if let Some(near_object) = line.near_object {
-        checks.flag("near_object", judgement.near_object, near_object);
-    }
     let parts = [
+        ("near_object", judgement.near_object, line.near_object),
         ("grasp_reward", judgement.grasp_reward, line.grasp_reward),
         (
             "in_place_reward",
@@ -331,31 +301,29 @@ fn check_transition(
 
 /// Checks what the original reads freshly at a reset: not the object's slots, which show the
 /// episode before, and not the second half in v2, for the same reason.
-fn check_reset(task: &str, rebuild: Rebuild, line: &Reset) -> Result<Checks, String> {
+fn check_reset(task: &TaskRecordings, line: &Reset) -> Result<Checks, String> {
     let theirs = observation_of(&line.obs)?;
-    let rebuilt = rebuild(&Recorded {
+    let rebuilt = (task.rebuild)(&Recorded {
         hand: line.ver.shown(line.hand),
         tcp: line.tcp,
         openness: metaworld::openness(line.lc, line.rc),
-        object: Object::Joint(first(&line.q, "q")?),
+        pads: None,
+        command: -1.0,
+        newest: line.q.clone(),
+        object: Object::Joints(line.q.clone()),
         target: line.target,
+        obj_init: line.obj_init,
         init_tcp: line.init_tcp,
         handle_init: line.handle_init,
+        first_seen: None,
     })?;
     let ours = metaworld::observation(&rebuilt.moment, &rebuilt.moment);
-    let mut checks = Checks::new(format!("{task} {} resets", line.ver.name()));
-    if line.rand_vec.len() != 3 {
-        return Err(format!(
-            "rand_vec has {} numbers, not 3",
-            line.rand_vec.len()
-        ));
-    }
-    checks.numbers(
-        "drawn pose",
-        &rebuilt.root,
-        &line.rand_vec,
-        OBSERVATION_TOLERANCE,
-    );
+    let mut checks = Checks::new(format!("{} {} resets", task.name, line.ver.name()));
+    let drawn = line.rand_vec.get(..task.n_drawn).ok_or_else(|| {
+        let n = line.rand_vec.len();
+        format!("rand_vec has {n} numbers, not {} or more", task.n_drawn)
+    })?;
+    checks.numbers("drawn pose", &rebuilt.root, drawn, OBSERVATION_TOLERANCE);
     let mut slots = |field, range: std::ops::Range<usize>| {
         checks.numbers(
             field,
@@ -376,12 +344,11 @@ fn check_reset(task: &str, rebuild: Rebuild, line: &Reset) -> Result<Checks, Str
 
 /// Checks reward and success; the first line of a trajectory tells the others where things are.
 fn check_trajectory(
-    task: &str,
-    rebuild: Rebuild,
+    task: &TaskRecordings,
     line: &TrajectoryStep,
     before: &mut StepsBefore,
 ) -> Result<Checks, String> {
-    let mut checks = Checks::new(format!("{task} {} trajectories", line.ver.name()));
+    let mut checks = Checks::new(format!("{} {} trajectories", task.name, line.ver.name()));
     let object = line
         .obj
         .first_chunk()
@@ -390,6 +357,7 @@ fn check_trajectory(
     if line.t == 0 {
         let start = Start {
             target: line.target.ok_or("missing field `target`")?,
+            obj_init: line.obj_init,
             init_tcp: line.init_tcp.ok_or("missing field `init_tcp`")?,
             object,
         };
@@ -400,17 +368,24 @@ fn check_trajectory(
         .starts
         .get(&line.episode)
         .ok_or("the first line (t = 0) of this trajectory is not above it")?;
-    let rebuilt = rebuild(&Recorded {
+    let rebuilt = (task.rebuild)(&Recorded {
         hand: line.hand,
         tcp: line.tcp,
         openness: line.grip,
+        pads: None,
+        command: command(&line.a)?,
+        newest: line.q.clone(),
         object: Object::Point(object),
         target: start.target,
+        obj_init: start.obj_init,
         init_tcp: start.init_tcp,
-        handle_init: Some(start.object),
+        handle_init: None,
+        first_seen: Some(start.object),
     })?;
     let judgement = rebuilt.judgement;
-    checks.number("reward", judgement.reward, line.r, TRAJECTORY_TOLERANCE);
+    if !task.needs_pads {
+        checks.number("reward", judgement.reward, line.r, TRAJECTORY_TOLERANCE);
+    }
     checks.flag("success", judgement.success, line.success);
     let theirs = &rebuilt.moment[4..7];
     checks.numbers("observation 4-6", theirs, &object, OBSERVATION_TOLERANCE);
@@ -423,9 +398,8 @@ fn observation_of(numbers: &[f64]) -> Result<[f64; OBSERVATION_SIZE], String> {
         .map_err(|_| format!("obs has {} numbers, not {OBSERVATION_SIZE}", numbers.len()))
 }
 
-fn first(numbers: &[f64], name: &str) -> Result<f64, String> {
-    numbers
-        .first()
-        .copied()
-        .ok_or_else(|| format!("{name} has no number in it"))
+/// The gripper command of an action.
+fn command(action: &[f64]) -> Result<f64, String> {
+    let command = action.get(3).ok_or("a has fewer than 4 numbers")?;
+    Ok(command.clamp(-1.0, 1.0))
 }

@@ -57,19 +57,22 @@ impl Fingers {
     }
 
     /// One control step under `command` in [−1, 1]: +1 closes, −1 opens, 0 lets them stay.
-    pub fn advance(&mut self, command: f64) {
+    /// `forces` push the right and the left finger along +y, newtons.
+    pub fn advance(&mut self, command: f64, forces: [f64; 2]) {
+        let [right, left] = forces;
         for _ in 0..SUBSTEPS {
-            self.right.advance(command, RIGHT_STOPS);
-            self.left.advance(-command, LEFT_STOPS);
+            self.right.advance(command, right, RIGHT_STOPS);
+            self.left.advance(-command, left, LEFT_STOPS);
         }
     }
 }
 
 impl Slide {
-    fn advance(&mut self, command: f64, stops: [f64; 2]) {
+    fn advance(&mut self, command: f64, force: f64, stops: [f64; 2]) {
         // Damping implicitly, as MuJoCo's integrator does.
         let mass_kg = MASS_KG + SUBSTEP_S * DAMPING;
-        let free = (SPRING * (command - self.position) - DAMPING * self.velocity) / mass_kg;
+        let spring = SPRING * (command - self.position);
+        let free = (spring + force - DAMPING * self.velocity) / mass_kg;
         let beyond = self.position - self.position.clamp(stops[0], stops[1]);
         let acceleration = if beyond == 0.0 {
             free
@@ -113,7 +116,7 @@ mod tests {
     fn openness_after_each_step(fingers: &mut Fingers, command: f64, n_steps: usize) -> Vec<f64> {
         (0..n_steps)
             .map(|_| {
-                fingers.advance(command);
+                fingers.advance(command, [0.0; 2]);
                 ((0.1 + fingers.left() - fingers.right()) / 0.1).clamp(0.0, 1.0)
             })
             .collect()

@@ -5,7 +5,8 @@
 //! steps behind, as a mass on a damped spring of 8180 N/m.
 //!
 //! Differs from the original: the hand never tilts (there up to 4° in free motion, 2.3° per N·m), one gain
-//! serves all directions, and the fingers do not feel what they touch.
+//! serves all directions, and what pushes a finger reaches the hand whole, however the finger
+//! gives way.
 //! Source: METAWORLD.md 1.1, 1.5, 1.6.
 
 use domain::scene::{Geometry, Material, Shape, Transform};
@@ -34,6 +35,17 @@ const SETTLING_STEPS: f64 = 20.0;
 const REACH_M: f64 = 0.89;
 const STRETCH: f64 = 0.35;
 const SHOULDER: Point = [0.0, 0.0, 0.317];
+/// How far a hard pull stretches the arm.
+const STRAIGHT_M: f64 = 0.93;
+/// Where the step response was measured.
+const MEASURED_AT: Point = [0.0, 0.6, 0.2];
+/// Bounds the drag of a stretched arm: a step of 12.5 ms would not carry more, m².
+const LEAST_SQUARE_LEFT: f64 = 0.2;
+/// Half extents of the gripper's body, whose edges are rounded.
+const PALM_HALF_M: [f32; 3] = [0.033, 0.053, 0.027];
+const PALM_EDGE_M: f32 = 0.02;
+/// From a finger's mounting to the origin of its pad, metres.
+const PAD_M: f64 = 0.003;
 
 /// Where a task's hand starts and may go.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -56,6 +68,21 @@ impl HandRange {
         lower: [-0.5, 0.40, 0.05],
         upper: [0.5, 1.0, 0.5],
     };
+    /// Over the middle of the table: door-open, drawer-open, sweep-into.
+    pub const FAR: Self = Self {
+        home: [0.0, 0.6, 0.2],
+        unsettled: [0.006_15, 0.000_19, -0.005_70],
+        ..Self::NEAR
+    };
+    /// This range, but as far down as the table itself lets the hand: door-unlock, faucet-open.
+    #[must_use]
+    pub const fn deep(self) -> Self {
+        let [x, y, _] = self.lower;
+        Self {
+            lower: [x, y, -0.15],
+            ..self
+        }
+    }
 }
 
 /// The hand of one episode; its body lives in the world it was built into.
@@ -65,8 +92,11 @@ pub struct SawyerHand {
     /// Right, left.
     finger_colliders: [ColliderHandle; 2],
     fingers: Fingers,
+    /// What pushes the right and the left finger along y, newtons.
+    finger_forces: [f64; 2],
     range: HandRange,
     target: Point,
+    command: f64,
     n_steps: u32,
 }
 
@@ -78,9 +108,11 @@ impl SawyerHand {
             .translation(vector(start))
             .lock_rotations()
             .additional_mass(MASS_KG as f32)
+            .gravity_scale(0.0)
             .can_sleep(false);
         let body = world.insert_body(body);
-        let palm = ColliderBuilder::cuboid(0.033, 0.053, 0.027);
+        let [x, y, z] = PALM_HALF_M.map(|half| half - PALM_EDGE_M);
+        let palm = ColliderBuilder::round_cuboid(x, y, z, PALM_EDGE_M);
         let palm = tabletop::collider(palm, [-0.009, 0.0, 0.066], Layer::Hand).density(0.0);
         world.insert_collider(palm, Some(body));
         let fingers = Fingers::open();
@@ -95,8 +127,10 @@ impl SawyerHand {
             body,
             finger_colliders,
             fingers,
+            finger_forces: [0.0; 2],
             range,
             target: range.home,
+            command: -1.0,
             n_steps: 0,
         }
     }
@@ -108,7 +142,8 @@ impl SawyerHand {
         self.target = std::array::from_fn(|i| {
             (self.target[i] + ACTION_SCALE_M * action[i]).clamp(lower[i], upper[i])
         });
-        self.fingers.advance(action[3]);
+        self.command = action[3];
+        self.fingers.advance(self.command, self.finger_forces);
         for (handle, centre) in self
             .finger_colliders
             .iter()
@@ -119,12 +154,23 @@ impl SawyerHand {
         }
 
         let rest = self.rest();
+        let out = outwards(self.position(world));
         self.n_steps += 1;
         let body = &mut world.bodies[self.body];
+        let velocity = body.linvel();
+        let (direction, drag) = (vector(out.direction), (out.drag - 1.0) as f32);
+        let dragged = velocity + direction * (drag * direction.dot(velocity));
         let force = (vector(rest) - body.translation()) * (PULL * MASS_KG) as f32
-            - body.linvel() * (DRAG * MASS_KG) as f32;
+            - dragged * (DRAG * MASS_KG) as f32;
         body.reset_forces(true);
         body.add_force(force, true);
+    }
+
+    /// Notes how hard the last step's contacts push the fingers, which give way to it in the next.
+    pub fn feel(&mut self, world: &PhysicsWorld) {
+        self.finger_forces = self
+            .finger_colliders
+            .map(|finger| f64::from(contact_force(world, finger).y));
     }
 
     /// Where the hand would come to rest, untouched.
@@ -153,9 +199,54 @@ impl SawyerHand {
         metaworld::openness(left, right)
     }
 
+    /// Where the inner pads of the left and the right finger are, metres along y.
+    pub fn pads(&self, world: &PhysicsWorld) -> [f64; 2] {
+        let y = self.position(world)[1];
+        [
+            y + 0.05 + self.fingers.left() - PAD_M,
+            y - 0.05 + self.fingers.right() + PAD_M,
+        ]
+    }
+
+    /// The gripper command of the last step: +1 closes, −1 opens, as at the reset.
+    pub fn command(&self) -> f64 {
+        self.command
+    }
+
+    /// Whether palm or fingers are in contact with anything.
+    pub fn touches(&self, world: &PhysicsWorld) -> bool {
+        let colliders = world.bodies[self.body].colliders().iter();
+        colliders
+            .flat_map(|collider| world.contact_pairs_with(*collider))
+            .any(ContactPair::has_any_active_contact)
+    }
+
     /// Both fingers.
     pub fn fingers(&self) -> &Fingers {
         &self.fingers
+    }
+}
+
+/// Away from the shoulder.
+struct Outwards {
+    /// Unit vector.
+    direction: Point,
+    /// How much harder the hand moves along it than where its drag was measured; 1 or more.
+    drag: f64,
+}
+
+/// The drag of the arm's damped joints grows the straighter it is.
+///
+/// Two links of half the reach `R` that hold the hand at distance `r` turn their elbow by
+/// `2 / √(R² − r²)` radians for each metre outwards, so that their damping acts on the hand with
+/// the square of that.
+fn outwards(hand: Point) -> Outwards {
+    let square_left = |distance: f64| STRAIGHT_M * STRAIGHT_M - distance * distance;
+    let distance = metaworld::distance(hand, SHOULDER);
+    let measured = square_left(metaworld::distance(MEASURED_AT, SHOULDER));
+    Outwards {
+        direction: metaworld::minus(hand, SHOULDER).map(|x| x / distance),
+        drag: (measured / square_left(distance).max(LEAST_SQUARE_LEFT)).max(1.0),
     }
 }
 
@@ -168,6 +259,37 @@ fn within_reach(target: Point) -> Point {
     }
     let scale = (REACH_M + STRETCH * (distance - REACH_M)) / distance;
     std::array::from_fn(|i| SHOULDER[i] + scale * out[i])
+}
+
+/// What the contacts of a collider exerted on it in the last step, newtons.
+fn contact_force(world: &PhysicsWorld, collider: ColliderHandle) -> Vector {
+    let parameters = &world.integration_parameters;
+    let substep_s = parameters.dt / parameters.num_solver_iterations as f32;
+    let mut force = Vector::ZERO;
+    for pair in world.contact_pairs_with(collider) {
+        let is_first = pair.collider1 == collider;
+        let other = if is_first {
+            pair.collider2
+        } else {
+            pair.collider1
+        };
+        let is_jointed = world.colliders[other]
+            .parent()
+            .is_some_and(|body| world.multibody_joints.rigid_body_link(body).is_some());
+        // Between plain bodies rapier has one friction per manifold, told by each of its points.
+        let n_frictions = if is_jointed { usize::MAX } else { 1 };
+        let mut on_first = Vector::ZERO;
+        for manifold in pair.solver_manifolds() {
+            let points = || manifold.points.iter().map(|point| &point.data);
+            let normal = points().map(|data| data.impulse).sum::<f32>();
+            on_first -= manifold.data.normal * (normal / parameters.dt);
+            for data in points().take(n_frictions) {
+                on_first += data.warmstart_tangent_world / substep_s;
+            }
+        }
+        force += if is_first { on_first } else { -on_first };
+    }
+    force
 }
 
 /// Centres of the right and the left finger's box in the hand's frame (world axes), metres.
@@ -219,12 +341,7 @@ pub fn shapes() -> Vec<Shape> {
     let palm = upright.then(Transform::at(-0.009, 0.0, 0.066));
     let rail = upright.then(Transform::at(0.0, 0.0, 0.05));
     let mut shapes = vec![
-        cuboid(
-            HAND_BODY,
-            palm,
-            [0.033, 0.053, 0.027],
-            Material::plain(0.5, 0.1, 0.1),
-        ),
+        cuboid(HAND_BODY, palm, PALM_HALF_M, Material::plain(0.5, 0.1, 0.1)),
         cuboid(
             HAND_BODY,
             rail,
@@ -269,6 +386,7 @@ mod tests {
         for _ in 0..n {
             hand.drive(world, action);
             world.step();
+            hand.feel(world);
         }
     }
 
@@ -331,6 +449,25 @@ mod tests {
         }
         let moved_mm = (hand.position(&world)[1] - start) * 1000.0;
         assert!((moved_mm - 12.2).abs() < 0.3, "{moved_mm} mm");
+    }
+
+    /// The hand pressed onto the table and dragged along it: friction of 2 pulls both fingers
+    /// back with more than their springs hold.
+    #[test]
+    fn a_fist_dragged_over_the_table_opens_its_trailing_finger() {
+        let mut world = tabletop::world().physics;
+        tabletop::add_table(&mut world);
+        let mut hand = SawyerHand::new(&mut world, ACROSS.deep());
+        advance(&mut world, &mut hand, [0.0, 0.0, -1.0, 0.7], 24);
+        let closed = hand.fingers.right();
+        assert!((0.02..0.045).contains(&closed), "{closed}");
+        advance(&mut world, &mut hand, [0.0, 1.0, 0.0, 0.7], 20);
+        assert!(hand.fingers.right() < closed - 0.01, "{:?}", hand.fingers);
+        assert!(
+            (hand.fingers.left() + 0.03).abs() < 0.001,
+            "{:?}",
+            hand.fingers
+        );
     }
 
     #[test]

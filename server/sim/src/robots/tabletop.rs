@@ -8,7 +8,7 @@ use rapier3d::prelude::*;
 
 use crate::world::{Timing, World};
 
-/// Which colliders meet: the hand meets everything, objects meet only the hand (in MetaWorld
+/// Which colliders meet: the hand meets everything, moving parts meet only the hand (in MetaWorld
 /// a moving part slides in its own frame with a gap of 2 mm, which is not simulated).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Layer {
@@ -16,6 +16,8 @@ pub enum Layer {
     Fixed,
     /// The moving part of an assembly.
     Object,
+    /// A body that lies on the table.
+    Loose,
     /// The robot's hand.
     Hand,
 }
@@ -24,21 +26,29 @@ impl Layer {
     /// Rapier's way of saying it.
     pub fn groups(self) -> InteractionGroups {
         let (fixed, object, hand) = (Group::GROUP_1, Group::GROUP_2, Group::GROUP_3);
+        let loose = Group::GROUP_4;
         let (memberships, filter) = match self {
-            Self::Fixed => (fixed, hand),
+            Self::Fixed => (fixed, hand | loose),
             Self::Object => (object, hand),
-            Self::Hand => (hand, fixed | object),
+            Self::Loose => (loose, hand | fixed),
+            Self::Hand => (hand, fixed | object | loose),
         };
         InteractionGroups::new(memberships, filter, InteractionTestMode::And)
     }
 }
 
+/// Seconds of a [`world`]'s step: one control step.
+const STEP_S: f32 = 0.0125;
+const N_SUBSTEPS: usize = 4;
+/// Seconds in which a [`world`]'s dynamics advance at once.
+pub const SUBSTEP_S: f32 = STEP_S / N_SUBSTEPS as f32;
+
 /// An empty world that is stepped once per control step (12.5 ms in four substeps). Without
 /// gravity: the arm carries the hand, assemblies slide level.
 pub fn world() -> World {
     let mut world = World::new(Timing {
-        step_s: 0.0125,
-        n_substeps: 4,
+        step_s: STEP_S,
+        n_substeps: N_SUBSTEPS,
         gravity: 0.0,
     });
     // A heavy hand pushes light parts against their stops: one iteration leaves them oscillating.
@@ -77,50 +87,93 @@ pub fn add_table(world: &mut PhysicsWorld) {
 /// Behind everything (sRGB).
 pub const BACKGROUND: [f32; 3] = [0.50, 0.495, 0.48];
 
+const WOOD: Material = Material {
+    color: [0.55, 0.40, 0.29, 1.0],
+    pattern: Pattern::Wood,
+    is_marker: false,
+};
+const LEG_WOOD: Material = Material::plain(0.42, 0.29, 0.21);
+
 /// Table, walls, floor and the robot's pedestal, all on body 0.
 pub fn scenery() -> Vec<Shape> {
-    const WOOD: Material = Material {
-        color: [0.55, 0.40, 0.29, 1.0],
-        pattern: Pattern::Wood,
-        is_marker: false,
-    };
+    let metal = Material::plain(0.42, 0.43, 0.44);
+    let mut shapes = floor_and_pedestal();
+    shapes.extend([
+        fixed_box([0.7, 0.4, 0.027], [0.0, 0.6, -0.027], WOOD),
+        fixed_box([0.62, 0.01, 0.05], [0.0, 0.24, -0.104], LEG_WOOD),
+        fixed_box([0.62, 0.01, 0.05], [0.0, 0.96, -0.104], LEG_WOOD),
+    ]);
+    for x in [-0.65, 0.65] {
+        for y in [0.26, 0.94] {
+            shapes.push(fixed_box([0.04, 0.04, 0.43], [x, y, -0.483], LEG_WOOD));
+        }
+    }
+    shapes.extend(WALLS.map(|(half, centre)| fixed_box(half, centre, metal)));
+    shapes
+}
+
+/// Half extents and centre of the boards around the hole of [`add_table_with_hole`], top at
+/// z = 0.05: in front, left, right, behind.
+const BOARDS: [([f32; 3], [f32; 3]); 4] = [
+    ([0.08, 0.28, 0.05], [0.0, 0.48, 0.0]),
+    ([0.31, 0.4, 0.05], [-0.39, 0.6, 0.0]),
+    ([0.31, 0.4, 0.05], [0.39, 0.6, 0.0]),
+    ([0.08, 0.04, 0.05], [0.0, 0.96, 0.0]),
+];
+/// Half extents and centre of the bottom of the hole. Its top is at z = 0: METAWORLD.md has it at
+/// −0.053, but in every recording a block in the hole comes to rest with its middle at 0.02.
+const BOTTOM: ([f32; 3], [f32; 3]) = ([0.08, 0.08, 0.025], [0.0, 0.84, -0.025]);
+/// Half extents and centre of what the boards lie on.
+const SUPPORT: ([f32; 3], [f32; 3]) = ([0.69, 0.38, 0.43], [0.0, 0.6, -0.483]);
+
+/// Adds a table without walls, its top at z = 0.05, with a square hole from (−0.08, 0.76) to
+/// (0.08, 0.92) whose bottom is at z = 0.
+pub fn add_table_with_hole(world: &mut PhysicsWorld) {
+    for ([x, y, z], centre) in BOARDS.into_iter().chain([BOTTOM, SUPPORT]) {
+        let board = ColliderBuilder::cuboid(x, y, z);
+        world.insert_collider(collider(board, centre, Layer::Fixed), None);
+    }
+}
+
+/// Height of the floor, metres.
+const FLOOR_Z: f32 = -0.913;
+
+/// Adds the floor, for what may fall off the table.
+pub fn add_floor(world: &mut PhysicsWorld) {
+    let floor = ColliderBuilder::cuboid(4.0, 4.0, 0.5);
+    let centre = [0.0, 0.0, FLOOR_Z - 0.5];
+    world.insert_collider(collider(floor, centre, Layer::Fixed), None);
+}
+
+/// The table with a hole, floor and the robot's pedestal, all on body 0.
+pub fn scenery_with_hole() -> Vec<Shape> {
+    let mut shapes = floor_and_pedestal();
+    shapes.extend(BOARDS.map(|(half, centre)| fixed_box(half, centre, WOOD)));
+    shapes.extend([BOTTOM, SUPPORT].map(|(half, centre)| fixed_box(half, centre, LEG_WOOD)));
+    shapes
+}
+
+fn floor_and_pedestal() -> Vec<Shape> {
     const TILES: Material = Material {
         color: [0.86, 0.86, 0.85, 1.0],
         pattern: Pattern::Tiles,
         is_marker: false,
     };
-    let leg_wood = Material {
-        pattern: Pattern::Plain,
-        color: [0.42, 0.29, 0.21, 1.0],
-        ..WOOD
-    };
-    let metal = Material::plain(0.42, 0.43, 0.44);
     let black = Material::plain(0.2, 0.2, 0.2);
-
-    let mut shapes = vec![
-        fixed_box([4.0, 4.0, 0.01], [0.0, 0.0, -0.923], TILES),
-        fixed_box([0.7, 0.4, 0.027], [0.0, 0.6, -0.027], WOOD),
-        fixed_box([0.62, 0.01, 0.05], [0.0, 0.24, -0.104], leg_wood),
-        fixed_box([0.62, 0.01, 0.05], [0.0, 0.96, -0.104], leg_wood),
+    vec![
+        fixed_box([4.0, 4.0, 0.01], [0.0, 0.0, FLOOR_Z - 0.01], TILES),
         fixed_box([0.11, 0.2, 0.265], [-0.325, 0.0, -0.38], black),
         fixed_box([0.385, 0.35, 0.155], [-0.1225, 0.0, -0.758], black),
-    ];
-    for x in [-0.65, 0.65] {
-        for y in [0.26, 0.94] {
-            shapes.push(fixed_box([0.04, 0.04, 0.43], [x, y, -0.483], leg_wood));
-        }
-    }
-    shapes.extend(WALLS.map(|(half, centre)| fixed_box(half, centre, metal)));
-    shapes.push(Shape {
-        body: 0,
-        local: Transform::at(-0.02, 0.0, -0.29),
-        geometry: Geometry::Cylinder {
-            radius: 0.18,
-            half_length: 0.31,
+        Shape {
+            body: 0,
+            local: Transform::at(-0.02, 0.0, -0.29),
+            geometry: Geometry::Cylinder {
+                radius: 0.18,
+                half_length: 0.31,
+            },
+            material: black,
         },
-        material: black,
-    });
-    shapes
+    ]
 }
 
 fn fixed_box(half: [f32; 3], centre: [f32; 3], material: Material) -> Shape {

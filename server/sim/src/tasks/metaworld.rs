@@ -1,15 +1,27 @@
 //! What all MetaWorld tasks share: the 39 numbers of an observation, the course of an episode,
 //! an expert's action, distances.
 //!
-//! Observations and judgements are functions of plain values: the environments call them with
-//! what the physics says, `golden` with what the original environment recorded.
+//! Observations and judgements are functions of plain values, [`Readings`]: the environments call
+//! them with what the physics says, `golden` with what the original environment recorded.
 
-use domain::environment::{EnvError, EnvSpec, EpisodeEnd, Step, TaskReward, checked_action};
+use std::fmt::Debug;
+
+use domain::environment::{
+    EnvError, EnvSpec, Environment, EpisodeEnd, Step, TaskReward, checked_action,
+};
+use domain::random::Rng;
+use rapier3d::prelude::PhysicsWorld;
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use crate::robots::sawyer_hand::{HandRange, SawyerHand};
+use crate::robots::sawyer_hand::{self, HandRange, SawyerHand};
 use crate::robots::tabletop;
 use crate::world::World;
+
+pub mod picture;
+mod simulation;
+
+pub use simulation::Simulation;
 
 /// Metres; x right, y away from the robot, z up.
 pub type Point = [f64; 3];
@@ -81,6 +93,11 @@ pub fn plus(a: Point, b: Point) -> Point {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
 }
 
+/// Component by component.
+pub fn minus(a: Point, b: Point) -> Point {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
 /// Metres in the plane of the table.
 pub fn distance_xy(a: Point, b: Point) -> f64 {
     (a[0] - b[0]).hypot(a[1] - b[1])
@@ -95,6 +112,71 @@ pub fn towards(hand: Point, waypoint: Point, gain: f64, grip: f64) -> Vec<f32> {
         .collect()
 }
 
+/// A MetaWorld task: what stands on the table, what an agent sees of it, and what counts.
+///
+/// [`Simulation`] makes an environment of it.
+pub trait Setup: Sized + Serialize + DeserializeOwned {
+    /// As users type it.
+    const NAME: &'static str;
+    /// Where the hand starts and may go.
+    const RANGE: HandRange;
+    /// Numbers of a pose that follow the hand's: see [`Setup::pose`].
+    const POSE_SIZE: usize;
+    /// Where the object is, as far as observation and reward care.
+    type Object: Copy + Debug;
+
+    /// Draws where the object stands: its root `P`.
+    fn draw(rng: &mut Rng) -> Point;
+
+    /// Adds everything that the hand may run into beside the object.
+    fn add_surroundings(world: &mut PhysicsWorld) {
+        tabletop::add_table(world);
+    }
+
+    /// Adds the object, its root at `root`.
+    fn add_object(world: &mut PhysicsWorld, root: Point) -> Self;
+
+    /// Reads where the object is.
+    fn object(&self, world: &PhysicsWorld) -> Self::Object;
+
+    /// How far the object has moved along its joint, metres or radians (without a joint: metres
+    /// from its start).
+    fn progress(object: &Self::Object) -> f64;
+
+    /// The first half of an observation.
+    fn moment(readings: &Readings<Self::Object>) -> [f64; MOMENT_SIZE];
+
+    /// Reward, its parts, success.
+    fn judge(readings: &Readings<Self::Object>) -> Judgement;
+
+    /// What a picture needs to know of the object, [`Setup::POSE_SIZE`] numbers.
+    fn pose(object: &Self::Object) -> Vec<f32>;
+}
+
+/// What observation, reward and success are made of: from physics or from a recording.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Readings<Object> {
+    /// The hand, metres.
+    pub hand: Point,
+    /// The point between the fingertips, metres.
+    pub tcp: Point,
+    /// 1 open.
+    pub openness: f64,
+    /// Where the left and the right finger's pads are, metres along y.
+    pub pads: [f64; 2],
+    /// The gripper command of the step, in [−1, 1]: +1 closes.
+    pub command: f64,
+    /// `tcp` at the reset.
+    pub init_tcp: Point,
+    /// The task's own.
+    pub object: Object,
+}
+
+/// 1 for yes, 0 for no.
+pub fn yes(flag: bool) -> f64 {
+    f64::from(u8::from(flag))
+}
+
 /// Ground truth about one step, with the parts of the reward that MetaWorld reports beside it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Judgement {
@@ -102,8 +184,8 @@ pub struct Judgement {
     pub reward: f64,
     /// Whether the task counts as solved at this step.
     pub success: bool,
-    /// Whether the hand is at the object.
-    pub near_object: bool,
+    /// Whether the hand is at the object: 1 or 0, in door-open something between.
+    pub near_object: f64,
     /// How well the hand is placed, in [0, 1].
     pub grasp_reward: f64,
     /// How well the object is placed, in [0, 1].
@@ -127,11 +209,11 @@ pub struct Episode {
 }
 
 impl Episode {
-    /// The table with a hand at its home; the task adds its object and then calls
+    /// Surroundings with a hand at its home; the task adds its object and then calls
     /// [`Episode::first_observation`].
-    pub fn new(seed: u64, range: HandRange) -> Self {
+    pub fn new(seed: u64, range: HandRange, add_surroundings: fn(&mut PhysicsWorld)) -> Self {
         let mut world = tabletop::world();
-        tabletop::add_table(&mut world.physics);
+        add_surroundings(&mut world.physics);
         let hand = SawyerHand::new(&mut world.physics, range);
         Self {
             init_tcp: hand.fingertips(&world.physics),
@@ -163,6 +245,7 @@ impl Episode {
             position.iter().all(|x| x.is_finite())
         };
         if self.world.step() && position_is_finite(self) {
+            self.hand.feel(&self.world.physics);
             return Ok(());
         }
         Err(EnvError::NotFinite {
@@ -170,6 +253,20 @@ impl Episode {
             seed: self.seed,
             step: self.n_steps,
         })
+    }
+
+    /// What the present state says, given where the object is.
+    pub fn readings<Object>(&self, object: Object) -> Readings<Object> {
+        let Self { world, hand, .. } = self;
+        Readings {
+            hand: hand.position(&world.physics),
+            tcp: hand.fingertips(&world.physics),
+            openness: hand.openness(),
+            pads: hand.pads(&world.physics),
+            command: hand.command(),
+            init_tcp: self.init_tcp,
+            object,
+        }
     }
 
     /// What the step brought, given the moment after it.
@@ -191,17 +288,22 @@ impl Episode {
 }
 
 /// Sizes and names of a MetaWorld task.
-pub fn spec(task: &str, pose_size: usize) -> EnvSpec {
+pub fn spec<S: Setup>() -> EnvSpec {
     EnvSpec {
-        task: task.into(),
+        task: S::NAME.into(),
         observation_size: OBSERVATION_SIZE,
         action_size: 4,
-        pose_size,
+        pose_size: sawyer_hand::POSE_SIZE + S::POSE_SIZE,
         episode_len: EPISODE_LEN,
         segment_len: SEGMENT_LEN,
         control_period_s: CONTROL_PERIOD_S,
         stages: Vec::new(),
     }
+}
+
+/// A simulation of a MetaWorld task.
+pub fn make<S: Setup + Send + 'static>() -> Box<dyn Environment> {
+    Box::new(Simulation::<S>::new())
 }
 
 /// Three numbers of an observation as a point.

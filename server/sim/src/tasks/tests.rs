@@ -131,6 +131,44 @@ fn every_task_refuses_a_snapshot_that_is_none_and_stays_as_it_was() {
     }
 }
 
+/// Ways to be rough with a simulation.
+#[derive(Clone, Copy)]
+enum Violence {
+    /// Uniform anew at each step.
+    Random,
+    /// Full speed either way, anew every so many steps.
+    FullSpeed(u32),
+    /// The same full action throughout.
+    Held(f32),
+    /// Full speed one way, then the other.
+    Alternating,
+}
+
+const VIOLENCES: [Violence; 6] = [
+    Violence::Random,
+    Violence::FullSpeed(1),
+    Violence::FullSpeed(40),
+    Violence::Held(1.0),
+    Violence::Held(-1.0),
+    Violence::Alternating,
+];
+
+impl Violence {
+    fn act(self, index: u32, rng: &mut Rng, action: &mut [f32]) {
+        for value in action {
+            match self {
+                Self::Random => *value = rng.uniform_in(-1.0, 1.0) as f32,
+                Self::FullSpeed(n_kept) if index % n_kept == 0 => {
+                    *value = rng.uniform_in(-1.0, 1.0).signum() as f32;
+                }
+                Self::FullSpeed(_) => {}
+                Self::Held(held) => *value = held,
+                Self::Alternating => *value = if index % 2 == 0 { 1.0 } else { -1.0 },
+            }
+        }
+    }
+}
+
 #[test]
 fn every_task_stays_finite_and_in_range_under_random_and_violent_actions() {
     for task in tasks() {
@@ -139,20 +177,10 @@ fn every_task_stays_finite_and_in_range_under_random_and_violent_actions() {
         let mut rng = Rng::new(21, Stream::Test, 0);
         for episode in 0..100_000 / u64::from(spec.episode_len) / tasks().len() as u64 {
             environment.reset(episode);
-            // Uniform, full speed either way anew at each step, and full speed kept for long.
-            let n_kept = [1, 1, 40][episode as usize % 3];
+            let violence = VIOLENCES[episode as usize % VIOLENCES.len()];
             let mut action = vec![0.0; spec.action_size];
             for index in 0..spec.episode_len {
-                if index % n_kept == 0 {
-                    for value in &mut action {
-                        let drawn = rng.uniform_in(-1.0, 1.0) as f32;
-                        *value = if episode % 3 == 0 {
-                            drawn
-                        } else {
-                            drawn.signum()
-                        };
-                    }
-                }
+                violence.act(index, &mut rng, &mut action);
                 let step = environment.step(&action).expect("finite");
                 assert_is_sound(task, &spec, &step);
             }

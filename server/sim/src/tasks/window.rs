@@ -4,27 +4,16 @@
 //! [0, 0.2]. Parts serve as colliders and as shapes.
 //! Source: METAWORLD.md 3.3 and 1.9.
 
-use domain::scene::{Geometry, Material, Shape, Transform};
-use rapier3d::prelude::*;
+use domain::scene::{Material, Scene, Transform};
+use rapier3d::prelude::{PhysicsWorld, SpringCoefficients};
+use serde::{Deserialize, Serialize};
 
+use super::assembly::{
+    self, Along, Motion, Mover, MovingPart, Part, Stops, capsule, cuboid, cylinder,
+};
+use super::metaworld::picture::{self, OBJECT_BODY};
 use super::metaworld::{Point, plus};
-use crate::robots::tabletop::{self, Layer};
-
-/// A form of the window in the frame it belongs to: the assembly's root `P` or the pane.
-struct Part {
-    form: Form,
-    centre: [f32; 3],
-    look: Material,
-}
-
-enum Form {
-    /// Half extents.
-    Box([f32; 3]),
-    /// Radius and half length along y.
-    RodY(f32, f32),
-    /// Radius and half length along z.
-    RodZ(f32, f32),
-}
+use crate::robots::tabletop;
 
 const FRAME: Material = Material::plain(0.36, 0.26, 0.27);
 const HANDLE: Material = Material::plain(0.65, 0.65, 0.65);
@@ -32,22 +21,6 @@ const GLASS: Material = Material {
     color: [0.0, 0.3, 0.4, 0.1],
     ..FRAME
 };
-
-const fn cuboid(centre: [f32; 3], half: [f32; 3], look: Material) -> Part {
-    Part {
-        form: Form::Box(half),
-        centre,
-        look,
-    }
-}
-
-const fn handle_part(centre: [f32; 3], form: Form) -> Part {
-    Part {
-        form,
-        centre,
-        look: HANDLE,
-    }
-}
 
 /// Frame and right pane, around `P`.
 const FIXED_PARTS: [Part; 11] = [
@@ -72,120 +45,107 @@ const SLIDING_PARTS: [Part; 11] = [
     cuboid([-0.104, -0.013, 0.14], [0.076, 0.012, 0.01], FRAME),
     cuboid([-0.104, -0.018, 0.0], [0.076, 0.001, 0.13], GLASS),
     cuboid([-0.104, -0.022, 0.0], [0.076, 0.003, 0.005], FRAME),
-    handle_part([-0.014, -0.028, -0.045], Form::RodY(0.012, 0.003)),
-    handle_part([-0.014, -0.028, 0.045], Form::RodY(0.012, 0.003)),
-    handle_part([-0.014, -0.06, -0.045], Form::RodY(0.008, 0.035)),
-    handle_part([-0.014, -0.06, 0.045], Form::RodY(0.008, 0.035)),
-    handle_part([-0.014, -0.095, 0.0], Form::RodZ(0.008, 0.045)),
+    cylinder([-0.014, -0.028, -0.045], Along::Y, 0.012, 0.003, HANDLE),
+    cylinder([-0.014, -0.028, 0.045], Along::Y, 0.012, 0.003, HANDLE),
+    capsule([-0.014, -0.06, -0.045], Along::Y, 0.008, 0.035, HANDLE),
+    capsule([-0.014, -0.06, 0.045], Along::Y, 0.008, 0.035, HANDLE),
+    capsule([-0.014, -0.095, 0.0], Along::Z, 0.008, 0.045, HANDLE),
 ];
 
-impl Part {
-    fn collider(&self, layer: Layer) -> ColliderBuilder {
-        let shape = match self.form {
-            Form::Box([x, y, z]) => ColliderBuilder::cuboid(x, y, z),
-            Form::RodY(radius, half) => ColliderBuilder::capsule_y(half, radius),
-            Form::RodZ(radius, half) => ColliderBuilder::capsule_z(half, radius),
-        };
-        tabletop::collider(shape, self.centre, layer).density(0.0)
+/// How far the pane slides, metres.
+pub const TRAVEL_M: f64 = 0.2;
+
+/// The pane's own joint. Its stops are stiffer than [`Stops::Soft`], because in the
+/// original the pane also meets its frame: these hold it within 9 mm against the expert's 2 kN,
+/// at 2 mm in the end (there 2.7 and 1.3 mm).
+const PANE: Mover<'_> = Mover {
+    motion: Motion::Slide(Along::X),
+    limits: [0.0, TRAVEL_M as f32],
+    stops: Stops::Own(SpringCoefficients {
+        natural_frequency: 200.0,
+        damping_ratio: 3.0,
+    }),
+    mass_kg: 0.638,
+    centre_of_mass: [0.0; 3],
+    inertia: 0.01,
+    parts: &SLIDING_PARTS,
+};
+
+/// A window in its world.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+pub struct Window {
+    root: Point,
+    pane: MovingPart,
+    init_handle: Point,
+}
+
+/// What the tasks read of a window.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WindowReading {
+    /// Root of the window, `P`.
+    pub root: Point,
+    /// How far the pane is open, `q`, metres.
+    pub slide: f64,
+    /// The task's point on the handle at the reset.
+    pub init_handle: Point,
+}
+
+impl Window {
+    /// Adds a window at `root` whose pane is open by `slide` metres; `handle` is the task's
+    /// point on the handle, seen from the pane.
+    pub fn add(world: &mut PhysicsWorld, root: Point, slide: f64, handle: Point) -> Self {
+        let frame = assembly::add_fixed(world, root, &FIXED_PARTS);
+        Self {
+            root,
+            pane: MovingPart::add(world, frame, root, &PANE, slide as f32),
+            init_handle: handle_at(root, slide, handle),
+        }
     }
 
-    fn shape(&self, body: usize) -> Shape {
-        let [x, y, z] = self.centre;
-        let upright = Transform::at(x, y, z);
-        let (local, geometry) = match self.form {
-            Form::Box(half) => (upright, Geometry::Cuboid { half }),
-            Form::RodY(radius, half_length) => (
-                upright.turned([1.0, 0.0, 0.0], std::f32::consts::FRAC_PI_2),
-                Geometry::Capsule {
-                    radius,
-                    half_length,
-                },
-            ),
-            Form::RodZ(radius, half_length) => (
-                upright,
-                Geometry::Capsule {
-                    radius,
-                    half_length,
-                },
-            ),
-        };
-        Shape {
-            body,
-            local,
-            geometry,
-            material: self.look,
+    /// Where the pane is.
+    pub fn read(&self, world: &PhysicsWorld) -> WindowReading {
+        WindowReading {
+            root: self.root,
+            slide: self.pane.position(world),
+            init_handle: self.init_handle,
         }
     }
 }
 
-/// Handle seen from the pane's frame.
-const HANDLE_POINT: Point = [-0.04, -0.095, 0.0];
-/// How far the pane slides, metres.
-pub const TRAVEL_M: f64 = 0.2;
-
-const PANE_MASS_KG: f32 = 0.638;
-const PANE_DAMPING: f32 = 2.0;
-/// Stops this stiff hold the pane within 9 mm against the expert's 2 kN, at 2 mm in the end
-/// (the original: 2.7 and 1.3 mm, where the pane also meets its frame).
-const STOP_HZ: f32 = 200.0;
-const STOP_DAMPING: f32 = 3.0;
-
-/// Adds a window at `root` with its pane at `slide` 0; returns the pane's body.
-///
-/// # Panics
-/// Never: the joint between two new bodies closes no loop.
-pub fn add(world: &mut PhysicsWorld, root: Point) -> RigidBodyHandle {
-    let at = Vector::new(root[0] as f32, root[1] as f32, root[2] as f32);
-    let frame = world.insert_body(RigidBodyBuilder::fixed().translation(at));
-    for part in &FIXED_PARTS {
-        world.insert_collider(part.collider(Layer::Fixed), Some(frame));
+impl WindowReading {
+    /// `[q, P.x, P.y, P.z]`.
+    pub fn pose(&self) -> Vec<f32> {
+        let [x, y, z] = self.root;
+        [self.slide, x, y, z].map(|v| v as f32).to_vec()
     }
-    let inertia = MassProperties::new(Vector::ZERO, PANE_MASS_KG, Vector::splat(0.01));
-    let pane = RigidBodyBuilder::dynamic()
-        .translation(at)
-        .additional_mass_properties(inertia)
-        .can_sleep(false);
-    let pane = world.insert_body(pane);
-    for part in &SLIDING_PARTS {
-        world.insert_collider(part.collider(Layer::Object), Some(pane));
-    }
-    let slide = PrismaticJointBuilder::new(Vector::X)
-        .limits([0.0, TRAVEL_M as f32])
-        .softness(SpringCoefficients::new(STOP_HZ, STOP_DAMPING));
-    let joint = world
-        .insert_multibody_joint(frame, pane, slide)
-        .expect("both bodies are new, so the joint closes no loop");
-    if let Some((multibody, _)) = world.multibody_joints.get_mut(joint) {
-        multibody.forward_kinematics(&world.bodies, true);
-        multibody.damping_mut().fill(PANE_DAMPING);
-        multibody.armature_mut().fill(0.001);
-    }
-    pane
 }
 
-/// What the observation calls the handle of window-open: a point left of the grip, of a window at `root` whose pane is open by `slide` metres.
-pub fn handle(root: Point, slide: f64) -> Point {
-    plus(plus(root, [slide, 0.0, 0.0]), HANDLE_POINT)
+/// Numbers of [`WindowReading::pose`].
+pub const POSE_SIZE: usize = 4;
+
+/// A point that moves with the pane: `P + (q, 0, 0) + handle`.
+pub fn handle_at(root: Point, slide: f64, handle: Point) -> Point {
+    plus(plus(root, [slide, 0.0, 0.0]), handle)
+}
+/// The picture of both tasks: frame and pane, and the goal.
+pub fn scene() -> Scene {
+    let fixed = FIXED_PARTS.iter().map(|part| part.shape(OBJECT_BODY));
+    let sliding = SLIDING_PARTS.iter().map(|part| part.shape(OBJECT_BODY + 1));
+    picture::scene(
+        tabletop::scenery(),
+        fixed.chain(sliding).collect(),
+        (0.02, picture::GREEN),
+        "corner3",
+    )
 }
 
-/// Bodies that [`place`] gives and [`shapes`] uses: the frame and the pane.
-pub const N_BODIES: usize = 2;
-
-/// Frame and pane, as the bodies `first_body` and the one after it.
-pub fn shapes(first_body: usize) -> Vec<Shape> {
-    let fixed = FIXED_PARTS.iter().map(|part| part.shape(first_body));
-    let sliding = SLIDING_PARTS.iter().map(|part| part.shape(first_body + 1));
-    fixed.chain(sliding).collect()
-}
-
-/// Where frame and pane are, from `[q, P.x, P.y, P.z]`.
-pub fn place(pose: [f32; 4]) -> [Transform; N_BODIES] {
-    let [slide, x, y, z] = pose;
-    [Transform::at(x, y, z), Transform::at(x + slide, y, z)]
-}
-
-/// The middle of the grip of a window whose pose is `[q, P.x, P.y, P.z]`.
-pub fn grip(pose: [f32; 4]) -> Transform {
-    let [_, pane] = place(pose);
-    pane.then(Transform::at(-0.014, -0.095, 0.0))
+/// Frame and pane of `[q, P.x, P.y, P.z]`, and the middle of the grip of a pane that is open by
+/// `goal` metres.
+pub fn place(pose: &[f32], goal: f32) -> [Transform; 3] {
+    let (slide, x, y, z) = (pose[0], pose[1], pose[2], pose[3]);
+    [
+        Transform::at(x, y, z),
+        Transform::at(x + slide, y, z),
+        Transform::at(x + goal - 0.014, y - 0.095, z),
+    ]
 }

@@ -30,195 +30,101 @@
 //! a stale read shows the one before); see also `robots::sawyer_hand`.
 //! Source: METAWORLD.md 3.3 and 1.9, METAWORLD_EXPERTS.md.
 
-use domain::environment::{EnvError, EnvSpec, Environment, Step};
-use domain::random::{Rng, Stream};
-use domain::scene::{Arm, Frame, Geometry, Material, Scene, Shape, Transform};
-use rapier3d::prelude::RigidBodyHandle;
+use domain::random::Rng;
+use domain::scene::{Frame, Scene};
+use rapier3d::prelude::PhysicsWorld;
 use serde::{Deserialize, Serialize};
 
-use super::metaworld::{self, Episode, Judgement, MOMENT_SIZE, Point, distance, plus};
-use super::window::handle;
-use super::{Task, window};
+use super::Task;
+use super::metaworld::{
+    self, Judgement, MOMENT_SIZE, Point, Readings, Setup, distance, picture, plus, yes,
+};
+use super::window::{self, Window, WindowReading, handle_at};
 use crate::reward::{Sigmoid, hamacher, tolerance};
-use crate::robots::sawyer_hand::{self, HandRange};
-use crate::robots::tabletop;
-use crate::world;
-
-const NAME: &str = "window-open";
+use crate::robots::sawyer_hand::HandRange;
 
 /// window-open, as the list of tasks shows it.
 pub const TASK: Task = Task {
-    name: NAME,
+    name: WindowOpen::NAME,
     title: "Open the window",
     summary: "The arm should push the window's handle to the right until the window is open.",
-    spec,
-    make: || Box::new(WindowOpen::new()),
+    spec: metaworld::spec::<WindowOpen>,
+    make: metaworld::make::<WindowOpen>,
     scene,
     place,
     expert,
 };
 
-// ── Readings: from physics or from a recording ─────────────────────────────────────────────
+/// The task's point on the handle, left of its grip, seen from the pane.
+const HANDLE: Point = [-0.04, -0.095, 0.0];
 
-/// What observation, reward and success are made of.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Readings {
-    /// The hand, metres.
-    pub hand: Point,
-    /// The point between the fingertips, metres.
-    pub tcp: Point,
-    /// 1 open.
-    pub openness: f64,
-    /// Root of the window, `P`.
-    pub root: Point,
-    /// How far the pane is open, `q`, metres.
-    pub slide: f64,
-    /// `tcp` at the reset.
-    pub init_tcp: Point,
-    /// Handle at the reset.
-    pub init_handle: Point,
-}
+/// The window of one episode.
+#[derive(Serialize, Deserialize)]
+pub struct WindowOpen(Window);
 
 /// Where the pane of a window at `root` should get to.
 pub fn goal(root: Point) -> Point {
     plus(root, [window::TRAVEL_M, 0.0, 0.0])
 }
 
-impl Readings {
-    /// The first half of an observation.
-    pub fn moment(&self) -> [f64; MOMENT_SIZE] {
-        let handle = handle(self.root, self.slide);
-        metaworld::moment(self.hand, self.openness, handle, [0.0; 4])
+/// The task's point on the handle of a window at `root` whose pane is open by `slide` metres.
+pub fn handle(root: Point, slide: f64) -> Point {
+    handle_at(root, slide, HANDLE)
+}
+
+impl Setup for WindowOpen {
+    const NAME: &'static str = "window-open";
+    const RANGE: HandRange = HandRange::NEAR;
+    const POSE_SIZE: usize = window::POSE_SIZE;
+    type Object = WindowReading;
+
+    fn draw(rng: &mut Rng) -> Point {
+        [rng.uniform_in(-0.1, 0.1), rng.uniform_in(0.7, 0.9), 0.16]
     }
 
-    /// Reward, its parts, success.
-    pub fn judge(&self) -> Judgement {
-        let handle = handle(self.root, self.slide);
-        let to_goal = (handle[0] - goal(self.root)[0]).abs();
-        let in_place_margin = (distance(self.root, goal(self.root)) - 0.05).abs();
+    fn add_object(world: &mut PhysicsWorld, root: Point) -> Self {
+        Self(Window::add(world, root, 0.0, HANDLE))
+    }
+
+    fn object(&self, world: &PhysicsWorld) -> WindowReading {
+        self.0.read(world)
+    }
+
+    fn progress(object: &WindowReading) -> f64 {
+        object.slide
+    }
+
+    fn moment(readings: &Readings<WindowReading>) -> [f64; MOMENT_SIZE] {
+        let handle = handle(readings.object.root, readings.object.slide);
+        metaworld::moment(readings.hand, readings.openness, handle, [0.0; 4])
+    }
+
+    fn judge(readings: &Readings<WindowReading>) -> Judgement {
+        let WindowReading {
+            root,
+            slide,
+            init_handle,
+        } = readings.object;
+        let handle = handle(root, slide);
+        let to_goal = (handle[0] - goal(root)[0]).abs();
+        let in_place_margin = (distance(root, goal(root)) - 0.05).abs();
         let in_place = tolerance(to_goal, [0.0, 0.05], in_place_margin, Sigmoid::LongTail);
-        let to_handle = distance(handle, self.tcp);
-        let reach_margin = (distance(self.init_handle, self.init_tcp) - 0.02).abs();
+        let to_handle = distance(handle, readings.tcp);
+        let reach_margin = (distance(init_handle, readings.init_tcp) - 0.02).abs();
         let reach = tolerance(to_handle, [0.0, 0.02], reach_margin, Sigmoid::LongTail);
         Judgement {
             reward: 10.0 * hamacher(reach, in_place),
             success: to_goal <= 0.05,
-            near_object: to_handle <= 0.05,
+            near_object: yes(to_handle <= 0.05),
             grasp_reward: reach,
             in_place_reward: in_place,
             obj_to_target: to_goal,
         }
     }
-}
 
-// ── Environment ────────────────────────────────────────────────────────────────────────────
-
-/// The simulation of window-open.
-pub struct WindowOpen {
-    spec: EnvSpec,
-    state: State,
-}
-
-/// Everything a snapshot holds.
-#[derive(Serialize, Deserialize)]
-struct State {
-    episode: Episode,
-    pane: RigidBodyHandle,
-    root: Point,
-    init_handle: Point,
-}
-
-impl WindowOpen {
-    /// A window in the episode of seed 0, before its first step.
-    pub fn new() -> Self {
-        Self {
-            spec: spec(),
-            state: State::new(0),
-        }
+    fn pose(object: &WindowReading) -> Vec<f32> {
+        object.pose()
     }
-
-    /// What the present state says.
-    pub fn readings(&self) -> Readings {
-        self.state.readings()
-    }
-}
-
-impl Default for WindowOpen {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl State {
-    fn new(seed: u64) -> Self {
-        let mut rng = Rng::new(seed, Stream::Reset, 0);
-        let root = [rng.uniform_in(-0.1, 0.1), rng.uniform_in(0.7, 0.9), 0.16];
-        let mut episode = Episode::new(seed, HandRange::NEAR);
-        let pane = window::add(&mut episode.world.physics, root);
-        Self {
-            episode,
-            pane,
-            root,
-            init_handle: handle(root, 0.0),
-        }
-    }
-
-    fn readings(&self) -> Readings {
-        let Episode { world, hand, .. } = &self.episode;
-        let pane_x = f64::from(world.physics.bodies[self.pane].translation().x);
-        Readings {
-            hand: hand.position(&world.physics),
-            tcp: hand.fingertips(&world.physics),
-            openness: hand.openness(),
-            root: self.root,
-            slide: pane_x - self.root[0],
-            init_tcp: self.episode.init_tcp,
-            init_handle: self.init_handle,
-        }
-    }
-}
-
-impl Environment for WindowOpen {
-    fn spec(&self) -> &EnvSpec {
-        &self.spec
-    }
-
-    fn reset(&mut self, seed: u64) -> Vec<f32> {
-        self.state = State::new(seed);
-        let now = self.state.readings().moment();
-        self.state.episode.first_observation(now)
-    }
-
-    fn step(&mut self, action: &[f32]) -> Result<Step, EnvError> {
-        self.state.episode.advance(NAME, action)?;
-        let readings = self.state.readings();
-        let judgement = readings.judge();
-        Ok(self.state.episode.finish_step(readings.moment(), judgement))
-    }
-
-    fn pose(&self) -> Vec<f32> {
-        let Episode { world, hand, .. } = &self.state.episode;
-        let mut pose = sawyer_hand::pose(hand, &world.physics).to_vec();
-        pose.push(self.state.readings().slide as f32);
-        pose.extend(self.state.root.map(|x| x as f32));
-        pose
-    }
-
-    fn snapshot(&self) -> Vec<u8> {
-        world::snapshot(NAME, &self.state)
-    }
-
-    fn restore(&mut self, snapshot: &[u8]) -> Result<(), EnvError> {
-        self.state = world::restore(NAME, snapshot)?;
-        Ok(())
-    }
-}
-
-/// Numbers in a pose: the hand's five, `q`, `P`.
-const POSE_SIZE: usize = sawyer_hand::POSE_SIZE + 4;
-
-fn spec() -> EnvSpec {
-    metaworld::spec(NAME, POSE_SIZE)
 }
 
 /// With a closed fist: above the handle's left side, down beside it, then right.
@@ -237,40 +143,16 @@ fn expert(observation: &[f32]) -> Vec<f32> {
 
 // ── Picture ────────────────────────────────────────────────────────────────────────────────
 
-const FRAME_BODY: usize = sawyer_hand::N_BODIES;
-const GOAL_BODY: usize = FRAME_BODY + window::N_BODIES;
-
 fn scene() -> Scene {
-    let mut shapes = tabletop::scenery();
-    shapes.extend(sawyer_hand::shapes());
-    shapes.extend(window::shapes(FRAME_BODY));
-    // The original's goal is hidden inside the frame; this one is where the grip should get to.
-    shapes.push(Shape {
-        body: GOAL_BODY,
-        local: Transform::IDENTITY,
-        geometry: Geometry::Sphere { radius: 0.02 },
-        material: Material::marker(0.0, 0.8, 0.0, 0.7),
-    });
-    Scene {
-        n_bodies: GOAL_BODY + 1,
-        shapes,
-        arm: Some(Arm::Sawyer {
-            hand: sawyer_hand::HAND_BODY,
-        }),
-        cameras: tabletop::cameras("corner3"),
-        background: tabletop::BACKGROUND,
-        focus: ([0.0, 0.5, 0.1], 1.1),
-    }
+    window::scene()
 }
 
-/// The bodies of [`scene`] in a pose of [`POSE_SIZE`] numbers.
+/// The window's bodies and the goal: the original's is hidden inside the frame, this one is
+/// where the grip should get to.
 fn place(pose: &[f32]) -> Frame {
-    let (hand, rest) = pose.split_at(sawyer_hand::POSE_SIZE);
-    let [slide, x, y, z] = [rest[0], rest[1], rest[2], rest[3]];
-    let mut frame = sawyer_hand::place(hand).to_vec();
-    frame.extend(window::place([slide, x, y, z]));
-    frame.push(window::grip([window::TRAVEL_M as f32, x, y, z]));
-    frame
+    picture::place(pose, |window| {
+        window::place(window, window::TRAVEL_M as f32)
+    })
 }
 
 #[cfg(test)]

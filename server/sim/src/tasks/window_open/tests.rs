@@ -1,61 +1,15 @@
+use domain::environment::Environment;
+
 use super::*;
-use crate::expert::{Rollout, rollout};
+use crate::robots::sawyer_hand;
+use crate::tasks::metaworld::{Simulation, picture::OBJECT_BODY};
 
-type Policy = Box<dyn FnMut(&[f32]) -> Vec<f32>>;
-
-fn play(seeds: std::ops::Range<u64>, policy: fn(u64) -> Policy) -> Vec<Rollout> {
-    let mut environment = WindowOpen::new();
-    seeds
-        .map(|seed| {
-            rollout(&mut environment, seed, &mut *policy(seed))
-                .expect("the episode runs to its end")
-        })
-        .collect()
+fn window() -> Simulation<WindowOpen> {
+    Simulation::new()
 }
 
-fn mean_return(rollouts: &[Rollout]) -> f64 {
-    rollouts.iter().map(|r| r.task_return).sum::<f64>() / rollouts.len() as f64
-}
-
-fn success_rate(rollouts: &[Rollout]) -> f64 {
-    rollouts.iter().filter(|r| r.success).count() as f64 / rollouts.len() as f64
-}
-
-/// METAWORLD_EXPERTS.md: success 1.00, return 2099 ± 371, first success at 88 (median).
-#[test]
-fn the_expert_does_as_well_as_in_the_original() {
-    let rollouts = play(0..50, |_| Box::new(expert));
-    assert!(
-        success_rate(&rollouts) >= 0.95,
-        "success {}",
-        success_rate(&rollouts)
-    );
-    let mut first: Vec<u32> = rollouts.iter().filter_map(|r| r.first_success).collect();
-    first.sort_unstable();
-    let median = f64::from(first[first.len() / 2]);
-    assert!(
-        (median / 88.0 - 1.0).abs() < 0.25,
-        "median first success {median}"
-    );
-    let mean = mean_return(&rollouts);
-    assert!((mean / 2099.0 - 1.0).abs() < 0.35, "mean return {mean}");
-}
-
-/// METAWORLD_EXPERTS.md: success 0, return 216 ± 44. (Of 2,000 random episodes 2 open
-/// the window here by chance.)
-#[test]
-fn random_actions_earn_what_they_earn_in_the_original() {
-    let rollouts = play(0..200, |seed| {
-        let mut rng = Rng::new(seed, Stream::Test, 0);
-        Box::new(move |_| (0..4).map(|_| rng.uniform_in(-1.0, 1.0) as f32).collect())
-    });
-    assert!(
-        success_rate(&rollouts) <= 0.01,
-        "success {}",
-        success_rate(&rollouts)
-    );
-    let mean = mean_return(&rollouts);
-    assert!((mean / 216.0 - 1.0).abs() < 0.25, "mean return {mean}");
+fn slide(environment: &Simulation<WindowOpen>) -> f64 {
+    environment.readings().object.slide
 }
 
 /// METAWORLD.md 3.3, seed 100, step 75.
@@ -66,12 +20,16 @@ fn the_worked_example_of_the_reward_holds() {
         hand: [0.07, 0.63, 0.08],
         tcp: [0.070_73, 0.634_13, 0.035_17],
         openness: 0.3,
-        root,
-        slide: 0.081_712 + 0.04 - root[0],
+        pads: [0.0; 2],
+        command: 1.0,
         init_tcp: [0.005_88, 0.399_76, 0.149_98],
-        init_handle: [-0.14, 0.69, 0.202],
+        object: WindowReading {
+            root,
+            slide: 0.081_712 + 0.04 - root[0],
+            init_handle: [-0.14, 0.69, 0.202],
+        },
     };
-    let judgement = readings.judge();
+    let judgement = WindowOpen::judge(&readings);
     assert!((judgement.in_place_reward - 0.296_761).abs() < 1e-4);
     assert!((judgement.grasp_reward - 0.475_837).abs() < 1e-4);
     assert!((judgement.reward - 2.236_496).abs() < 1e-3, "{judgement:?}");
@@ -80,17 +38,17 @@ fn the_worked_example_of_the_reward_holds() {
 
 #[test]
 fn the_first_observation_shows_this_episode_twice_and_hides_the_goal() {
-    let mut environment = WindowOpen::new();
+    let mut environment = window();
     let observation = environment.reset(7);
     assert_eq!(observation[..18], observation[18..36]);
     assert_eq!(observation[36..], [0.0; 3]);
-    let handle = handle(environment.readings().root, 0.0);
+    let handle = handle(environment.readings().object.root, 0.0);
     assert!((f64::from(observation[5]) - handle[1]).abs() < 1e-6);
 }
 
 #[test]
 fn a_pushed_pane_stops_where_the_window_is_open() {
-    let mut environment = WindowOpen::new();
+    let mut environment = window();
     let mut observation = environment.reset(1);
     let mut widest: f64 = 0.0;
     for _ in 0..500 {
@@ -98,14 +56,14 @@ fn a_pushed_pane_stops_where_the_window_is_open() {
             .step(&expert(&observation))
             .expect("the expert's actions fit")
             .observation;
-        widest = widest.max(environment.readings().slide);
+        widest = widest.max(slide(&environment));
     }
     assert!(widest < 0.21, "{widest} m");
 }
 
 #[test]
 fn a_pose_is_drawn_where_the_physics_had_it() {
-    let mut environment = WindowOpen::new();
+    let mut environment = window();
     let mut observation = environment.reset(3);
     for _ in 0..95 {
         let step = environment.step(&expert(&observation));
@@ -116,28 +74,28 @@ fn a_pose_is_drawn_where_the_physics_had_it() {
     assert_eq!(frame.len(), scene().n_bodies);
     let hand = frame[sawyer_hand::HAND_BODY].position;
     assert!((f64::from(hand[0]) - readings.hand[0]).abs() < 1e-6);
-    let pane_x = f64::from(frame[FRAME_BODY + 1].position[0]);
-    assert!((pane_x - readings.root[0] - readings.slide).abs() < 1e-6);
+    let pane_x = f64::from(frame[OBJECT_BODY + 1].position[0]);
+    assert!((pane_x - readings.object.root[0] - readings.object.slide).abs() < 1e-6);
     assert!(
-        readings.slide > 0.05,
+        readings.object.slide > 0.05,
         "the window is on its way: {}",
-        readings.slide
+        readings.object.slide
     );
 }
 
 #[test]
 fn an_episode_goes_on_bit_for_bit_from_a_snapshot_taken_while_pushing() {
-    let mut environment = WindowOpen::new();
+    let mut environment = window();
     let mut observation = environment.reset(5);
-    let advance = |environment: &mut WindowOpen, observation: &mut Vec<f32>| {
+    let advance = |environment: &mut Simulation<WindowOpen>, observation: &mut Vec<f32>| {
         let step = environment.step(&expert(observation));
         *observation = step.expect("the expert's actions fit").observation;
         observation.iter().map(|x| x.to_bits()).collect::<Vec<_>>()
     };
-    while environment.readings().slide < 0.05 {
+    while slide(&environment) < 0.05 {
         advance(&mut environment, &mut observation);
     }
-    let mut restored = WindowOpen::new();
+    let mut restored = window();
     let snapshot = environment.snapshot();
     restored.restore(&snapshot).expect("it is its own snapshot");
     let mut observation_restored = observation.clone();

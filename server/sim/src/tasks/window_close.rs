@@ -1,0 +1,158 @@
+//! window-close: push the window's handle to the left until the pane is shut.
+//!
+//! # Geometry
+//! The window of window-open, wide open: its frame stands on the table at `P`, drawn per reset:
+//! x = 0, y in [0.75, 0.9], z = 0.2. The pane slides along +x by `q` in [0, 0.2] m on soft stops
+//! and starts at 0.2. The goal is `T = P`.
+//!
+//! # State
+//! | observation | meaning | unit |
+//! |---|---|---|
+//! | 0–2 | hand | m |
+//! | 3 | gripper openness | – |
+//! | 4–6 | handle `h = P + (q + 0.01, −0.095, 0)`, a point right of its grip | m |
+//! | 7–17 | zeros | – |
+//! | 18–35 | 0–17 one step before | |
+//! | 36–38 | zeros: the goal is hidden | m |
+//!
+//! # Action
+//! `(x, y, z, grip)` in [−1, 1]: increments of the hand's target of up to 1 cm, +1 closes.
+//!
+//! # Reward
+//! `r = 10 · hamacher(R, I)` with the long-tailed
+//! `I = tolerance(|h.x − T.x|; 0, 0.05, margin |h₀.x − T.x| − 0.05)` and the Gaussian
+//! `R = tolerance(‖h − tcp‖; 0, 0.02, margin ‖h₀ − tcp₀‖ − 0.02)`; `h₀`, `tcp₀` at the reset.
+//!
+//! # Success
+//! `|h.x − T.x| ≤ 0.05`.
+//!
+//! Differs from the original: `h₀` and the first observation show this episode's window (there
+//! a stale read shows the one before); see also `robots::sawyer_hand`.
+//! Source: METAWORLD.md 3.4 and 1.9, METAWORLD_EXPERTS.md.
+
+use domain::random::Rng;
+use domain::scene::{Frame, Scene};
+use rapier3d::prelude::PhysicsWorld;
+use serde::{Deserialize, Serialize};
+
+use super::Task;
+use super::metaworld::{
+    self, Judgement, MOMENT_SIZE, Point, Readings, Setup, distance, picture, plus, yes,
+};
+use super::window::{self, Window, WindowReading, handle_at};
+use crate::reward::{Sigmoid, hamacher, tolerance};
+use crate::robots::sawyer_hand::HandRange;
+
+/// window-close, as the list of tasks shows it.
+pub const TASK: Task = Task {
+    name: WindowClose::NAME,
+    title: "Close the window",
+    summary: "The arm should push the window's handle to the left until the window is shut.",
+    spec: metaworld::spec::<WindowClose>,
+    make: metaworld::make::<WindowClose>,
+    scene,
+    place,
+    expert,
+};
+
+/// The task's point on the handle, right of its grip, seen from the pane.
+const HANDLE: Point = [0.01, -0.095, 0.0];
+
+/// The window of one episode.
+#[derive(Serialize, Deserialize)]
+pub struct WindowClose(Window);
+
+/// Where the pane of a window at `root` should get to.
+pub fn goal(root: Point) -> Point {
+    root
+}
+
+/// The task's point on the handle of a window at `root` whose pane is open by `slide` metres.
+pub fn handle(root: Point, slide: f64) -> Point {
+    handle_at(root, slide, HANDLE)
+}
+
+impl Setup for WindowClose {
+    const NAME: &'static str = "window-close";
+    const RANGE: HandRange = HandRange::NEAR;
+    const POSE_SIZE: usize = window::POSE_SIZE;
+    type Object = WindowReading;
+
+    fn draw(rng: &mut Rng) -> Point {
+        [0.0, rng.uniform_in(0.75, 0.9), 0.2]
+    }
+
+    fn add_object(world: &mut PhysicsWorld, root: Point) -> Self {
+        Self(Window::add(world, root, window::TRAVEL_M, HANDLE))
+    }
+
+    fn object(&self, world: &PhysicsWorld) -> WindowReading {
+        self.0.read(world)
+    }
+
+    fn progress(object: &WindowReading) -> f64 {
+        object.slide
+    }
+
+    fn moment(readings: &Readings<WindowReading>) -> [f64; MOMENT_SIZE] {
+        let handle = handle(readings.object.root, readings.object.slide);
+        metaworld::moment(readings.hand, readings.openness, handle, [0.0; 4])
+    }
+
+    fn judge(readings: &Readings<WindowReading>) -> Judgement {
+        let WindowReading {
+            root,
+            slide,
+            init_handle,
+        } = readings.object;
+        let handle = handle(root, slide);
+        let goal_x = goal(root)[0];
+        let to_goal = (handle[0] - goal_x).abs();
+        let in_place_margin = ((init_handle[0] - goal_x).abs() - 0.05).abs();
+        let in_place = tolerance(to_goal, [0.0, 0.05], in_place_margin, Sigmoid::LongTail);
+        let to_handle = distance(handle, readings.tcp);
+        let reach_margin = (distance(init_handle, readings.init_tcp) - 0.02).abs();
+        let reach = tolerance(to_handle, [0.0, 0.02], reach_margin, Sigmoid::Gaussian);
+        Judgement {
+            reward: 10.0 * hamacher(reach, in_place),
+            success: to_goal <= 0.05,
+            near_object: yes(to_handle <= 0.05),
+            grasp_reward: reach,
+            in_place_reward: in_place,
+            obj_to_target: to_goal,
+        }
+    }
+
+    fn pose(object: &WindowReading) -> Vec<f32> {
+        object.pose()
+    }
+}
+
+/// With a closed fist: above the handle's right side, down beside it, then left.
+fn expert(observation: &[f32]) -> Vec<f32> {
+    let hand = metaworld::point(observation, 0);
+    let beside = plus(metaworld::point(observation, 4), [0.03, -0.03, -0.08]);
+    let waypoint = if metaworld::distance_xy(hand, beside) > 0.04 {
+        plus(beside, [0.0, 0.0, 0.25])
+    } else if (hand[2] - beside[2]).abs() > 0.02 {
+        beside
+    } else {
+        plus(beside, [-0.1, 0.0, 0.0])
+    };
+    metaworld::towards(hand, waypoint, 25.0, 1.0)
+}
+
+// ── Picture ────────────────────────────────────────────────────────────────────────────────
+
+fn scene() -> Scene {
+    window::scene()
+}
+
+/// The window's bodies and the goal: the original's is hidden inside the frame, this one is
+/// where the grip should get to.
+fn place(pose: &[f32]) -> Frame {
+    picture::place(pose, |window| window::place(window, 0.0))
+}
+
+#[cfg(test)]
+mod tests;
