@@ -275,6 +275,26 @@ pub const PRESETS: &[(&str, &str, &str)] = &[
         include_str!("../../../assets/presets/task/window-open.toml"),
     ),
     (
+        "task",
+        "walker-run",
+        include_str!("../../../assets/presets/task/walker-run.toml"),
+    ),
+    (
+        "task",
+        "quadruped-walk",
+        include_str!("../../../assets/presets/task/quadruped-walk.toml"),
+    ),
+    (
+        "task",
+        "quadruped-run",
+        include_str!("../../../assets/presets/task/quadruped-run.toml"),
+    ),
+    (
+        "task",
+        "cheetah-run",
+        include_str!("../../../assets/presets/task/cheetah-run.toml"),
+    ),
+    (
         "quick",
         "go-fetch-return",
         include_str!("../../../assets/presets/quick/go-fetch-return.toml"),
@@ -283,6 +303,26 @@ pub const PRESETS: &[(&str, &str, &str)] = &[
         "quick",
         "window-open",
         include_str!("../../../assets/presets/quick/window-open.toml"),
+    ),
+    (
+        "quick",
+        "walker-run",
+        include_str!("../../../assets/presets/quick/walker-run.toml"),
+    ),
+    (
+        "quick",
+        "quadruped-walk",
+        include_str!("../../../assets/presets/quick/quadruped-walk.toml"),
+    ),
+    (
+        "quick",
+        "quadruped-run",
+        include_str!("../../../assets/presets/quick/quadruped-run.toml"),
+    ),
+    (
+        "quick",
+        "cheetah-run",
+        include_str!("../../../assets/presets/quick/cheetah-run.toml"),
     ),
 ];
 
