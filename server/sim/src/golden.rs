@@ -4,13 +4,15 @@
 //! after a step and what the original made of it; the same [`crate::tasks::window_open::Readings`] are built
 //! from the line as from our physics, and observation, reward and success are compared. A
 //! *reset* line is checked in what the original reads freshly, a *trajectory* line in reward and
-//! success, its numbers being rounded more. Other lines are counted as skipped, with the reason.
+//! success, its numbers being rounded more. For the control suite a line is a state: positions and
+//! velocities go into our simulation, whose readings then have to agree. Other lines are counted as skipped, with the reason.
 
 use std::collections::BTreeMap;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
+mod dmcontrol;
 mod metaworld;
 
 /// Largest error of a reward and its parts that still counts as the same.
@@ -19,6 +21,11 @@ pub const REWARD_TOLERANCE: f64 = 1e-6;
 pub const OBSERVATION_TOLERANCE: f64 = 1e-5;
 /// The same for rewards of trajectory lines, whose inputs are rounded to 7 digits.
 pub const TRAJECTORY_TOLERANCE: f64 = 2e-5;
+
+/// Largest error of poses and inertias, relative to the largest number among them.
+pub const KINEMATICS_TOLERANCE: f64 = 1e-4;
+/// The same for gravity's and all other bias forces.
+pub const LOAD_TOLERANCE: f64 = 1e-3;
 
 /// What one kind of number came to, over all lines of one kind of recording.
 #[derive(Debug, Clone, PartialEq)]
@@ -184,6 +191,9 @@ impl Replay {
             Some(serde_json::Value::String(task)) => task.clone(),
             Some(other) => return Err(format!("\"task\" should be a name, not {other}")),
         };
+        if let Some(check) = dmcontrol::checker(&task) {
+            return check(&task, &value).map(Some);
+        }
         if !metaworld::knows(&task) {
             *self
                 .report
@@ -258,6 +268,15 @@ impl Checks {
             error: differences.fold(0.0, f64::max),
             tolerance,
         });
+    }
+
+    /// The largest difference, as a share of the largest number of theirs, or of 1 if that is
+    /// more: near 0 there is only rounding to compare.
+    fn relative(&mut self, field: &'static str, ours: &[f64], theirs: &[f64], tolerance: f64) {
+        let largest = theirs.iter().fold(1.0, |most: f64, x| most.max(x.abs()));
+        let scale = 1.0 / largest;
+        let scaled = |numbers: &[f64]| numbers.iter().map(|x| x * scale).collect::<Vec<_>>();
+        self.numbers(field, &scaled(ours), &scaled(theirs), tolerance);
     }
 
     fn flag(&mut self, field: &'static str, ours: bool, theirs: bool) {

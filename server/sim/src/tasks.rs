@@ -3,8 +3,14 @@
 use domain::environment::{EnvSpec, Environment};
 use domain::scene::{Frame, Scene};
 
+pub mod cheetah_run;
 pub mod go_fetch_return;
+pub mod locomotion;
 pub mod metaworld;
+pub mod quadruped;
+pub mod quadruped_run;
+pub mod quadruped_walk;
+pub mod walker_run;
 pub mod window;
 pub mod window_open;
 
@@ -26,13 +32,20 @@ pub struct Task {
     /// Where each body of [`Task::scene`] is in a recorded pose, `[pose_size]` → `[n_bodies]`.
     /// Needs no physics, so a pose can be drawn long after its episode.
     pub place: fn(pose: &[f32]) -> Frame,
-    /// A scripted policy without memory, `[S]` → `[A]`.
-    pub expert: fn(observation: &[f32]) -> Vec<f32>,
+    /// A scripted policy without memory, `[S]` → `[A]`; `None` where nobody wrote one.
+    pub expert: Option<fn(observation: &[f32]) -> Vec<f32>>,
 }
 
 /// Every task, in the order in which lists show them.
 pub fn tasks() -> &'static [Task] {
-    const TASKS: &[Task] = &[go_fetch_return::TASK, window_open::TASK];
+    const TASKS: &[Task] = &[
+        go_fetch_return::TASK,
+        window_open::TASK,
+        walker_run::TASK,
+        quadruped_walk::TASK,
+        quadruped_run::TASK,
+        cheetah_run::TASK,
+    ];
     TASKS
 }
 

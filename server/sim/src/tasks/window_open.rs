@@ -55,7 +55,7 @@ pub const TASK: Task = Task {
     make: || Box::new(WindowOpen::new()),
     scene,
     place,
-    expert,
+    expert: Some(expert),
 };
 
 // ── Readings: from physics or from a recording ─────────────────────────────────────────────
