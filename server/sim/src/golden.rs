@@ -14,6 +14,7 @@ use std::path::{Path, PathBuf};
 
 mod dmcontrol;
 mod metaworld;
+pub mod one_step;
 
 /// Largest error of a reward and its parts that still counts as the same.
 pub const REWARD_TOLERANCE: f64 = 1e-6;

@@ -201,7 +201,7 @@ fn read<T: serde::de::DeserializeOwned>(line: &Value) -> Result<T, String> {
 }
 
 /// A simulation in the recorded state.
-fn simulation<const N: usize>(
+pub(super) fn simulation<const N: usize>(
     model: &Model<N>,
     qpos: &[f64],
     qvel: &[f64],

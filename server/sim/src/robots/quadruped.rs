@@ -300,8 +300,42 @@ pub struct Senses {
     pub toe_torques: [[f64; 3]; 4],
 }
 
+/// The quadruped in motion.
+#[derive(Debug, Serialize, Deserialize)]
+pub struct Quadruped {
+    /// Bodies and joints.
+    pub simulation: Simulation<N_DOFS>,
+    /// Of the motors.
+    pub activations: [f64; N_MOTORS],
+    /// What it felt in the last dynamics step.
+    pub senses: Senses,
+}
+
+impl Quadruped {
+    /// At rest in the configuration `q`.
+    pub fn new(q: Vec<f64>) -> Self {
+        Self {
+            simulation: Simulation::new(q),
+            activations: [0.0; N_MOTORS],
+            senses: Senses::default(),
+        }
+    }
+
+    /// Moves by one control step under commands that are held.
+    pub fn advance(&mut self, commands: &[f64; N_MOTORS]) {
+        let mut v_before = Vec::new();
+        for _ in 0..N_SUBSTEPS {
+            v_before.clone_from(&self.simulation.v);
+            let torques = torques(&self.simulation.q, &self.activations);
+            self.simulation.step(model(), &torques);
+            self.activations = activations_after_a_step(&self.activations, commands);
+        }
+        self.senses = senses(&mut self.simulation, &v_before);
+    }
+}
+
 /// What was felt in the last dynamics step, at whose start the poses were read.
-pub fn senses(simulation: &mut Simulation<N_DOFS>, v_before: &[f64]) -> Senses {
+fn senses(simulation: &mut Simulation<N_DOFS>, v_before: &[f64]) -> Senses {
     let model = model();
     let accelerations = *simulation.accelerations();
     let mass = toe_mass();

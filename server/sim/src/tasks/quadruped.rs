@@ -47,7 +47,7 @@ use super::locomotion::{Gait, Sizes, picture};
 use crate::articulated::simulation::Simulation;
 use crate::articulated::vector::normalized;
 use crate::robots::quadruped::{
-    self, FIRST_LEG_COORDINATE, FIRST_LEG_DOF, N_COORDINATES, N_DOFS, N_MOTORS, N_SUBSTEPS, Senses,
+    self, FIRST_LEG_COORDINATE, FIRST_LEG_DOF, N_COORDINATES, N_DOFS, N_MOTORS, Quadruped, Senses,
 };
 
 /// Numbers in an observation.
@@ -141,54 +141,29 @@ impl Readings {
     }
 }
 
-/// The quadruped in an episode.
-#[derive(Serialize, Deserialize)]
-pub(super) struct Quadruped {
-    pub(super) simulation: Simulation<N_DOFS>,
-    pub(super) activations: [f64; N_MOTORS],
-    pub(super) senses: Senses,
+/// What a quadruped's present state says.
+fn readings(quadruped: &mut Quadruped) -> Readings {
+    let Quadruped {
+        simulation,
+        activations,
+        senses,
+    } = quadruped;
+    Readings::of(simulation, activations, senses)
 }
 
-impl Quadruped {
-    /// At rest in the configuration `q`.
-    pub(super) fn new(q: Vec<f64>) -> Self {
-        Self {
-            simulation: Simulation::new(q),
-            activations: [0.0; N_MOTORS],
-            senses: Senses::default(),
+/// The start of the episode of `seed`.
+fn begin(seed: u64) -> Quadruped {
+    let mut rng = Rng::new(seed, Stream::Reset, 0);
+    let turn = normalized(std::array::from_fn(|_| rng.normal()));
+    let mut q = quadruped::model().rest();
+    q[3..7].copy_from_slice(&turn);
+    for centimetres in 0.. {
+        q[2] = f64::from(centimetres) * 0.01;
+        if !Simulation::new(q.clone()).touches_anything(quadruped::model()) {
+            break;
         }
     }
-
-    /// The start of the episode of `seed`.
-    pub(super) fn begin(seed: u64) -> Self {
-        let mut rng = Rng::new(seed, Stream::Reset, 0);
-        let turn = normalized(std::array::from_fn(|_| rng.normal()));
-        let mut q = quadruped::model().rest();
-        q[3..7].copy_from_slice(&turn);
-        for centimetres in 0.. {
-            q[2] = f64::from(centimetres) * 0.01;
-            if !Simulation::new(q.clone()).touches_anything(quadruped::model()) {
-                break;
-            }
-        }
-        Self::new(q)
-    }
-
-    /// Moves by one control step under commands that are held.
-    pub(super) fn advance(&mut self, commands: &[f64; N_MOTORS]) {
-        let mut v_before = Vec::new();
-        for _ in 0..N_SUBSTEPS {
-            v_before.clone_from(&self.simulation.v);
-            let torques = quadruped::torques(&self.simulation.q, &self.activations);
-            self.simulation.step(quadruped::model(), &torques);
-            self.activations = quadruped::activations_after_a_step(&self.activations, commands);
-        }
-        self.senses = quadruped::senses(&mut self.simulation, &v_before);
-    }
-
-    pub(super) fn readings(&mut self) -> Readings {
-        Readings::of(&mut self.simulation, &self.activations, &self.senses)
-    }
+    Quadruped::new(q)
 }
 
 /// One of the two tasks.
@@ -213,7 +188,7 @@ impl<P: Pace> Gait<ACTION_SIZE> for AtPace<P> {
 
     fn begin(seed: u64) -> Self {
         Self {
-            quadruped: Quadruped::begin(seed),
+            quadruped: begin(seed),
             pace: std::marker::PhantomData,
         }
     }
@@ -223,7 +198,7 @@ impl<P: Pace> Gait<ACTION_SIZE> for AtPace<P> {
     }
 
     fn judge(&mut self) -> (Vec<f64>, f64) {
-        let readings = self.quadruped.readings();
+        let readings = readings(&mut self.quadruped);
         let reward = readings.reward(P::TARGET_SPEED);
         (readings.observation().to_vec(), reward)
     }

@@ -225,7 +225,7 @@ fn an_open_loop_trot_walks_at_the_original_pace() {
         });
         quadruped.advance(&commands);
         if step >= 250 {
-            speed += quadruped.readings().velocity[0] / 250.0;
+            speed += readings(&mut quadruped).velocity[0] / 250.0;
         }
     }
     assert!((speed - 0.50).abs() < 0.05, "{speed} m/s");
@@ -237,7 +237,7 @@ fn chance_does_not_pull_the_coupled_joints_apart() {
     let mut rng = Rng::new(5, Stream::Test, 0);
     let mut widest = 0.0_f64;
     for seed in 0..3 {
-        let mut quadruped = Quadruped::begin(seed);
+        let mut quadruped = begin(seed);
         for _ in 0..300 {
             let action = std::array::from_fn(|_| rng.uniform_in(-1.0, 1.0));
             quadruped.advance(&quadruped::commands(&action));
@@ -252,7 +252,7 @@ fn chance_does_not_pull_the_coupled_joints_apart() {
 #[test]
 fn an_episode_begins_free_of_contact_and_no_higher_than_it_must() {
     for seed in 0..20 {
-        let mut quadruped = Quadruped::begin(seed);
+        let mut quadruped = begin(seed);
         assert!(!quadruped.simulation.touches_anything(quadruped::model()));
         quadruped.simulation.q[2] -= 0.01;
         assert!(quadruped.simulation.touches_anything(quadruped::model()));
@@ -266,7 +266,7 @@ fn it_weighs_what_the_original_weighs() {
 
 #[test]
 fn standing_still_earns_half_and_falling_nothing() {
-    let mut readings = level(0.57).readings();
+    let mut readings = readings(&mut level(0.57));
     let mut reward = |upright, speed, target| {
         readings.upright = upright;
         readings.velocity[0] = speed;
