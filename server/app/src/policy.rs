@@ -17,7 +17,7 @@ pub struct Policy {
 }
 
 enum Kind {
-    Expert(fn(&[f32]) -> Vec<f32>),
+    Expert(sim::tasks::Expert),
     Random,
     Trained(Box<TrainedPolicy>),
 }

@@ -1,8 +1,8 @@
 //! Returns of chance and of doing nothing, per task:
 //! `cargo run -p sim --example returns TASK [EPISODES]`.
 //!
-//! Prints mean, standard deviation, least and greatest return of both policies, and how fast the last numbers of
-//! a pose, the robot's joints, move on average under chance, per second.
+//! Prints mean, standard deviation, least and greatest return of both policies, and how fast the
+//! last numbers of a pose, a walking robot's joints, move on average under chance, per second.
 
 use domain::random::{Rng, Stream};
 use sim::expert::{Rollout, rollout};

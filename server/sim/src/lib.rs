@@ -1,4 +1,5 @@
-//! Tasks simulated with rapier3d, and runners with our own dynamics, behind `domain`'s [`Environment`](domain::environment::Environment).
+//! Tasks simulated with rapier3d, and runners with our own dynamics, behind `domain`'s
+//! [`Environment`](domain::environment::Environment).
 //!
 //! Invariants: the only crate that touches rapier; never draws, never learns; an episode is a
 //! function of its seed and its actions, bit for bit on one machine; what happens between two

@@ -32,9 +32,12 @@ pub struct Task {
     /// Where each body of [`Task::scene`] is in a recorded pose, `[pose_size]` → `[n_bodies]`.
     /// Needs no physics, so a pose can be drawn long after its episode.
     pub place: fn(pose: &[f32]) -> Frame,
-    /// A scripted policy without memory, `[S]` → `[A]`; `None` where nobody wrote one.
-    pub expert: Option<fn(observation: &[f32]) -> Vec<f32>>,
+    /// A scripted policy without memory; `None` where nobody wrote one.
+    pub expert: Option<Expert>,
 }
+
+/// From an observation, `[S]`, to an action, `[A]`.
+pub type Expert = fn(observation: &[f32]) -> Vec<f32>;
 
 /// Every task, in the order in which lists show them.
 pub fn tasks() -> &'static [Task] {

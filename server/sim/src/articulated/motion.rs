@@ -171,8 +171,7 @@ impl<const N: usize> Motion<N> {
             }
         }
         let mut matrix = [[0.0; N]; N];
-        for row in 0..N {
-            let dof = &model.dofs[row];
+        for (row, dof) in model.dofs.iter().enumerate() {
             let momentum = self.composites[dof.body].apply(self.axes[row]);
             // This one and those before it that move the same body.
             let above = model.moved_by[dof.body] & ((1 << (row + 1)) - 1);

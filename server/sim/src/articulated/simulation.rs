@@ -7,7 +7,7 @@ use super::model::{DofKind, Model};
 use super::motion::Motion;
 use super::softness::Softness;
 use super::solver::{Cholesky, Row, Solver, times};
-use super::vector::{Mat3, Vec3, turned};
+use super::vector::{Vec3, turned};
 
 /// A robot in motion with `N` degrees of freedom: what changes, and the scratch to change it.
 #[derive(Debug, Serialize, Deserialize)]
@@ -302,12 +302,4 @@ fn tangents(normal: Vec3, grain: Vec3) -> [Vec3; 2] {
         .or_else(|| along(Vec3::Y));
     let first = first.unwrap_or(Vec3::X);
     [first, normal.cross(first)]
-}
-
-/// Turns a rotation matrix and a point into what `domain`'s scenes take.
-pub fn transform(position: Vec3, rotation: &Mat3) -> domain::scene::Transform {
-    domain::scene::Transform {
-        position: position.to_array().map(|x| x as f32),
-        rotation: rotation.quaternion().map(|x| x as f32),
-    }
 }

@@ -257,7 +257,7 @@ fn leg_joint(axis: Vec3, range_deg: [f64; 2]) -> Joint {
 pub fn commands(action: &[f64; N_MOTORS]) -> [f64; N_MOTORS] {
     std::array::from_fn(|motor| {
         let [low, high] = COMMANDS[motor % 3];
-        let command = low + (action[motor] + 1.0) / 2.0 * (high - low);
+        let command = low + f64::midpoint(action[motor], 1.0) * (high - low);
         // The original hands commands over in single precision.
         f64::from(command as f32).clamp(low, high)
     })

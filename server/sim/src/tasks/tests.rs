@@ -16,10 +16,11 @@ fn random_policy(task: &Task, seed: u64) -> impl FnMut(&[f32]) -> Vec<f32> + use
 }
 
 /// The task's expert, or chance where it has none.
-fn best_policy(task: &Task, seed: u64) -> Box<dyn FnMut(&[f32]) -> Vec<f32>> {
-    match task.expert {
-        Some(expert) => Box::new(expert),
-        None => Box::new(random_policy(task, seed)),
+fn best_policy(task: &Task, seed: u64) -> impl FnMut(&[f32]) -> Vec<f32> + use<> {
+    let (expert, mut chance) = (task.expert, random_policy(task, seed));
+    move |observation| match expert {
+        Some(expert) => expert(observation),
+        None => chance(observation),
     }
 }
 

@@ -4,7 +4,6 @@ use domain::scene::{Camera, Frame, Geometry, Material, Pattern, Scene, Shape, Tr
 
 use crate::articulated::model::{Form, Model, Solid};
 use crate::articulated::motion::Motion;
-use crate::articulated::simulation::transform;
 use crate::articulated::vector::{Mat3, Vec3};
 
 /// Body of the floor; the robot's own follow.
@@ -156,6 +155,13 @@ fn along(ends: [Vec3; 2]) -> (Transform, f32) {
         Mat3::IDENTITY
     };
     (transform(middle, &turn), (length / 2.0) as f32)
+}
+
+fn transform(position: Vec3, rotation: &Mat3) -> Transform {
+    Transform {
+        position: position.to_array().map(|x| x as f32),
+        rotation: rotation.quaternion().map(|x| x as f32),
+    }
 }
 
 #[cfg(test)]
