@@ -19,9 +19,10 @@ const PLAIN: u32 = 0;
 const WOOD: u32 = 1;
 const TILES: u32 = 2;
 const GRID: u32 = 3;
-const MARKER: u32 = 4;
-const GLASS: u32 = 5;
-const VEIL: u32 = 6;
+const CHECKER: u32 = 4;
+const MARKER: u32 = 5;
+const GLASS: u32 = 6;
+const VEIL: u32 = 7;
 override LOOK: u32 = 0;
 
 struct Vertex {
@@ -104,6 +105,15 @@ fn grid(p: vec2f) -> f32 {
     return 1.0 - 0.16 * max(lines.x, lines.y);
 }
 
+// Squares that fade into their mean where a pixel covers many.
+fn checker(p: vec2f) -> f32 {
+    let blur = max(fwidth(p), vec2f(1e-4));
+    let wave = abs(fract(p * 0.5) - 0.5) * 2.0 - 0.5;
+    let side = clamp(wave / blur, vec2f(-0.5), vec2f(0.5)) * 2.0;
+    let far = smoothstep(0.3, 1.0, max(blur.x, blur.y));
+    return 0.86 + 0.14 * side.x * side.y * (1.0 - far);
+}
+
 // 1 in the light, 0 in the shadow.
 fn sunlit(p: vec3f) -> f32 {
     let outside = any(p.xy < vec2f(0.0)) || any(p > vec3f(1.0));
@@ -131,6 +141,9 @@ fn fragment(in: Fragment) -> @location(0) vec4f {
     }
     if LOOK == GRID {
         base *= grid(in.surface);
+    }
+    if LOOK == CHECKER {
+        base *= checker(in.surface);
     }
     let n = normalize(in.normal);
     let v = normalize(in.to_eye);

@@ -119,6 +119,11 @@ fn a_policy_or_a_run_that_is_none_is_named() {
         here,
         &["nowhere"],
     );
+    expect(
+        &["evaluate", "walker-run", "--policy", "expert"],
+        here,
+        &["walker-run", "no scripted expert", "random"],
+    );
     expect(&["train", "--resume", "nowhere"], here, &["nowhere"]);
     expect(
         &["export", "--run", "1", "--data", "nowhere"],

@@ -10,7 +10,6 @@ use crate::cli::BadInput;
 
 /// A policy over several states at once.
 pub struct Policy {
-    task: &'static sim::tasks::Task,
     spec: EnvSpec,
     kind: Kind,
     noise: f64,
@@ -18,7 +17,7 @@ pub struct Policy {
 }
 
 enum Kind {
-    Expert,
+    Expert(sim::tasks::Expert),
     Random,
     Trained(Box<TrainedPolicy>),
 }
@@ -29,7 +28,8 @@ impl Policy {
     /// sum clipped again.
     ///
     /// # Errors
-    /// [`BadInput`] for a path that holds no checkpoint of this task.
+    /// [`BadInput`] for a path that holds no checkpoint of this task, and for the expert of a
+    /// task that has none.
     pub fn open(
         task: &'static sim::tasks::Task,
         name: &str,
@@ -37,12 +37,11 @@ impl Policy {
         seed: u64,
     ) -> anyhow::Result<Self> {
         let kind = match name {
-            "expert" => Kind::Expert,
+            "expert" => Kind::Expert(task.expert.ok_or_else(|| no_expert(task))?),
             "random" => Kind::Random,
             path => Kind::Trained(Box::new(trained(task, path)?)),
         };
         Ok(Self {
-            task,
             spec: (task.spec)(),
             kind,
             noise,
@@ -55,9 +54,9 @@ impl Policy {
         let n = observations.len() / self.spec.observation_size;
         let mut rng = Rng::new(self.seed, Stream::Rollout, u64::from(t));
         let mut actions = match &self.kind {
-            Kind::Expert => observations
+            Kind::Expert(expert) => observations
                 .chunks(self.spec.observation_size)
-                .flat_map(|o| (self.task.expert)(o))
+                .flat_map(expert)
                 .collect(),
             Kind::Random => (0..n * self.spec.action_size)
                 .map(|_| rng.uniform_in(-1.0, 1.0) as f32)
@@ -72,6 +71,13 @@ impl Policy {
         }
         actions
     }
+}
+
+fn no_expert(task: &sim::tasks::Task) -> BadInput {
+    BadInput(format!(
+        "{} has no scripted expert; use 'random' or a checkpoint",
+        task.name
+    ))
 }
 
 fn trained(task: &sim::tasks::Task, path: &str) -> anyhow::Result<TrainedPolicy> {

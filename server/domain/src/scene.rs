@@ -97,6 +97,11 @@ pub enum Geometry {
         /// Metres.
         radius: f32,
     },
+    /// Round, its axes the frame's; shaded like a ball.
+    Ellipsoid {
+        /// Half the length along x, y, z, metres.
+        semi_axes: [f32; 3],
+    },
     /// A flat ring or disc in the frame's xy plane, seen from both sides.
     Ring {
         /// Metres; 0 for a disc.
@@ -117,6 +122,8 @@ pub enum Pattern {
     Tiles,
     /// A fine grid, 0.25 m: shows how far things move.
     Grid,
+    /// Light and dark squares, 1 m: shows from afar how far things move.
+    Checker,
 }
 
 /// Colour and finish of a shape.

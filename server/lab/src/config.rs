@@ -315,6 +315,26 @@ pub const PRESETS: &[(&str, &str, &str)] = &[
         include_str!("../../../assets/presets/task/push-green.toml"),
     ),
     (
+        "task",
+        "walker-run",
+        include_str!("../../../assets/presets/task/walker-run.toml"),
+    ),
+    (
+        "task",
+        "quadruped-walk",
+        include_str!("../../../assets/presets/task/quadruped-walk.toml"),
+    ),
+    (
+        "task",
+        "quadruped-run",
+        include_str!("../../../assets/presets/task/quadruped-run.toml"),
+    ),
+    (
+        "task",
+        "cheetah-run",
+        include_str!("../../../assets/presets/task/cheetah-run.toml"),
+    ),
+    (
         "quick",
         "door-open",
         include_str!("../../../assets/presets/quick/door-open.toml"),
@@ -358,6 +378,26 @@ pub const PRESETS: &[(&str, &str, &str)] = &[
         "quick",
         "push-green",
         include_str!("../../../assets/presets/quick/push-green.toml"),
+    ),
+    (
+        "quick",
+        "walker-run",
+        include_str!("../../../assets/presets/quick/walker-run.toml"),
+    ),
+    (
+        "quick",
+        "quadruped-walk",
+        include_str!("../../../assets/presets/quick/quadruped-walk.toml"),
+    ),
+    (
+        "quick",
+        "quadruped-run",
+        include_str!("../../../assets/presets/quick/quadruped-run.toml"),
+    ),
+    (
+        "quick",
+        "cheetah-run",
+        include_str!("../../../assets/presets/quick/cheetah-run.toml"),
     ),
 ];
 

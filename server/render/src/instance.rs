@@ -22,6 +22,8 @@ pub(crate) enum Look {
     Tiles,
     /// A grid, lit.
     Grid,
+    /// Light and dark squares, lit.
+    Checker,
     /// Unlit.
     Marker,
     /// Lit and seen through.
@@ -31,11 +33,12 @@ pub(crate) enum Look {
 }
 
 impl Look {
-    pub(crate) const ALL: [Self; 7] = [
+    pub(crate) const ALL: [Self; 8] = [
         Self::Plain,
         Self::Wood,
         Self::Tiles,
         Self::Grid,
+        Self::Checker,
         Self::Marker,
         Self::Glass,
         Self::Veil,
@@ -59,6 +62,7 @@ impl Look {
                 Pattern::Wood => Self::Wood,
                 Pattern::Tiles => Self::Tiles,
                 Pattern::Grid => Self::Grid,
+                Pattern::Checker => Self::Checker,
             },
         }
     }
@@ -245,6 +249,9 @@ fn stretch(geometry: Geometry) -> (MeshKind, [f32; 4], [f32; 4]) {
             let (size, other) = round(radius, 0.0);
             (MeshKind::Capsule, size, other)
         }
+        Geometry::Ellipsoid {
+            semi_axes: [x, y, z],
+        } => (MeshKind::Capsule, [x, y, z, 0.0], [0.0; 4]),
         Geometry::Ring { inner, outer } => (
             MeshKind::Ring,
             [outer, outer, 0.0, 0.0],

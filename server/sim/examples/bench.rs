@@ -2,7 +2,7 @@
 //! `cargo run --release -p sim --example bench [SECONDS]`.
 //!
 //! Each task plays whole episodes, resets and the policy's own cost included, once with random
-//! actions and once with its expert's: contacts make the second one slower.
+//! actions and once with its expert's, if it has one: contacts make the second one slower.
 
 use std::fs;
 
@@ -23,8 +23,11 @@ fn main() {
                 .map(|_| rng.uniform_in(-1.0, 1.0) as f32)
                 .collect()
         });
-        let expert = steps_per_second(task, seconds, &mut |o| (task.expert)(o));
-        println!("{:<18} {random:>14.0}   {expert:>14.0}", task.name);
+        let expert = task.expert.map_or_else(
+            || "-".into(),
+            |mut expert| format!("{:.0}", steps_per_second(task, seconds, &mut expert)),
+        );
+        println!("{:<18} {random:>14.0}   {expert:>14}", task.name);
     }
 }
 

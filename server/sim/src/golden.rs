@@ -6,16 +6,20 @@
 //! from the line as from our physics, and observation, reward and success are compared. A
 //! *reset* line is checked in what the original reads freshly, a *trajectory* line in reward and
 //! success, its numbers being rounded more; the actions of a whole trajectory are also played in
-//! our physics. RoboDesk's lines say themselves what they are; those about its arm alone are put
-//! to the physics. Other lines are counted as skipped, with the reason.
+//! our physics. For the control suite a line is a state: positions and velocities go into our
+//! simulation, whose readings then have to agree. RoboDesk's lines say themselves what they are;
+//! those about its arm alone are put to the physics. Other lines are counted as skipped, with the
+//! reason.
 
 use std::collections::BTreeMap;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
+mod dmcontrol;
 pub mod figures;
 mod metaworld;
+pub mod one_step;
 mod robodesk;
 pub mod trajectory;
 
@@ -27,6 +31,11 @@ pub const REWARD_TOLERANCE: f64 = 1e-6;
 pub const OBSERVATION_TOLERANCE: f64 = 1e-5;
 /// The same for rewards of trajectory lines, whose inputs are rounded to 7 digits.
 pub const TRAJECTORY_TOLERANCE: f64 = 2e-5;
+
+/// Largest error of poses and inertias, relative to the largest number among them.
+pub const KINEMATICS_TOLERANCE: f64 = 1e-4;
+/// The same for gravity's and all other bias forces.
+pub const LOAD_TOLERANCE: f64 = 1e-3;
 
 /// What one kind of number came to, over all lines of one kind of recording.
 #[derive(Debug, Clone, PartialEq)]
@@ -214,6 +223,9 @@ impl Replay {
             };
             return robodesk::check(kind, &value, &mut before.robodesk).map(Some);
         }
+        if let Some(check) = dmcontrol::checker(&task) {
+            return check(&task, &value).map(Some);
+        }
         if !metaworld::knows(&task) {
             return Ok(self.skip(format!("task {task} is not known")));
         }
@@ -291,6 +303,15 @@ impl Checks {
             error: differences.fold(0.0, f64::max),
             tolerance,
         });
+    }
+
+    /// The largest difference, as a share of the largest number of theirs, or of 1 if that is
+    /// more: near 0 there is only rounding to compare.
+    fn relative(&mut self, field: &'static str, ours: &[f64], theirs: &[f64], tolerance: f64) {
+        let largest = theirs.iter().fold(1.0, |most: f64, x| most.max(x.abs()));
+        let scale = 1.0 / largest;
+        let scaled = |numbers: &[f64]| numbers.iter().map(|x| x * scale).collect::<Vec<_>>();
+        self.numbers(field, &scaled(ours), &scaled(theirs), tolerance);
     }
 
     fn flag(&mut self, field: &'static str, ours: bool, theirs: bool) {

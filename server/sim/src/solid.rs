@@ -83,7 +83,7 @@ impl Solid {
                 Rotation::IDENTITY,
             ),
             Geometry::Sphere { radius } => (ColliderBuilder::ball(radius), Rotation::IDENTITY),
-            Geometry::Ring { .. } => return None,
+            Geometry::Ring { .. } | Geometry::Ellipsoid { .. } => return None,
         };
         let [w, x, y, z] = self.at.rotation;
         let turn = Rotation::from_xyzw(x, y, z, w) * own;

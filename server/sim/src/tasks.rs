@@ -5,15 +5,21 @@ use domain::scene::{Frame, Scene};
 
 pub mod assembly;
 pub mod cabinet;
+pub mod cheetah_run;
 pub mod desk;
 pub mod door_open;
 pub mod door_unlock;
 pub mod drawer_open;
 pub mod faucet_open;
 pub mod go_fetch_return;
+pub mod locomotion;
 pub mod metaworld;
 pub mod push_green;
+pub mod quadruped;
+pub mod quadruped_run;
+pub mod quadruped_walk;
 pub mod sweep_into;
+pub mod walker_run;
 pub mod window;
 pub mod window_close;
 pub mod window_open;
@@ -36,9 +42,12 @@ pub struct Task {
     /// Where each body of [`Task::scene`] is in a recorded pose, `[pose_size]` → `[n_bodies]`.
     /// Needs no physics, so a pose can be drawn long after its episode.
     pub place: fn(pose: &[f32]) -> Frame,
-    /// A scripted policy without memory, `[S]` → `[A]`.
-    pub expert: fn(observation: &[f32]) -> Vec<f32>,
+    /// A scripted policy without memory; `None` where nobody wrote one.
+    pub expert: Option<Expert>,
 }
+
+/// From an observation, `[S]`, to an action, `[A]`.
+pub type Expert = fn(observation: &[f32]) -> Vec<f32>;
 
 /// Every task, in the order in which lists show them.
 pub fn tasks() -> &'static [Task] {
@@ -52,6 +61,10 @@ pub fn tasks() -> &'static [Task] {
         faucet_open::TASK,
         sweep_into::TASK,
         push_green::TASK,
+        walker_run::TASK,
+        quadruped_walk::TASK,
+        quadruped_run::TASK,
+        cheetah_run::TASK,
     ];
     TASKS
 }

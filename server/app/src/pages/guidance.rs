@@ -45,6 +45,22 @@ const TEXTS: &[(&str, &str)] = &[
         "window-open",
         include_str!("../../../../assets/guidance/window-open.md"),
     ),
+    (
+        "walker-run",
+        include_str!("../../../../assets/guidance/walker-run.md"),
+    ),
+    (
+        "quadruped-walk",
+        include_str!("../../../../assets/guidance/quadruped-walk.md"),
+    ),
+    (
+        "quadruped-run",
+        include_str!("../../../../assets/guidance/quadruped-run.md"),
+    ),
+    (
+        "cheetah-run",
+        include_str!("../../../../assets/guidance/cheetah-run.md"),
+    ),
 ];
 
 /// For a task whose text is not written yet.

@@ -54,6 +54,22 @@ fn the_recordings_of_the_originals_are_reproduced() {
     }
     assert!(has("push-green states", "success"));
     assert!(has("panda kinematics", "inertia"));
+    for task in [
+        "walker_run",
+        "cheetah_run",
+        "quadruped_walk",
+        "quadruped_run",
+    ] {
+        for field in ["reward", "observation"] {
+            assert!(has(&format!("{task} states"), field), "{task}: {field}");
+        }
+    }
+    for robot in ["walker", "cheetah", "quadruped"] {
+        for field in ["positions", "inertia matrix", "gravity load"] {
+            let recording = format!("{robot}_kinematics");
+            assert!(has(&recording, field), "{recording}: {field}");
+        }
+    }
 }
 
 /// One expert's episode of each task. Others can end elsewhere: where a fist slips off a handle,
@@ -89,6 +105,37 @@ fn a_wrong_reward_and_a_wrong_success_are_found() {
         .collect();
     assert_eq!(wrong.len(), 2, "{wrong:?}");
     assert!(wrong.iter().all(|f| f.worst == "recording.jsonl:1"));
+}
+
+#[test]
+fn a_state_of_the_control_suite_that_differs_is_found() {
+    let path = repository().join("tests/golden/walker_run.jsonl");
+    let text = fs::read_to_string(path).expect("the recording is part of the repository");
+    let line = text
+        .lines()
+        .find(|line| line.contains("\"step\""))
+        .expect("it has a step");
+    let replay = |line: &str| {
+        let mut replay = Replay::new();
+        replay.text("walker_run.jsonl", line.as_bytes());
+        replay.finish()
+    };
+    assert!(replay(line).is_within_tolerance());
+    let mut value: serde_json::Value = serde_json::from_str(line).expect("it is JSON");
+    value["qvel"][1] = serde_json::json!(value["qvel"][1].as_f64().expect("a number") + 0.01);
+    let report = replay(&value.to_string());
+    let wrong = report.fields.iter().filter(|f| !f.is_within_tolerance());
+    let wrong: Vec<_> = wrong.map(|f| f.field).collect();
+    assert!(
+        wrong.contains(&"observation") && wrong.contains(&"speed"),
+        "{wrong:?}"
+    );
+    value["qpos"] = serde_json::json!([1.0]);
+    let report = replay(&value.to_string());
+    assert_eq!(
+        report.malformed,
+        ["walker_run.jsonl:1: qpos has 1 numbers, not 9"]
+    );
 }
 
 #[test]

@@ -60,7 +60,7 @@ pub const TASK: Task = Task {
     make: metaworld::make::<DoorUnlock>,
     scene,
     place,
-    expert,
+    expert: Some(expert),
 };
 
 // ── Reward ─────────────────────────────────────────────────────────────────────────────────

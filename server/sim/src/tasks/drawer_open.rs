@@ -55,7 +55,7 @@ pub const TASK: Task = Task {
     make: metaworld::make::<DrawerOpen>,
     scene,
     place,
-    expert,
+    expert: Some(expert),
 };
 
 // ── Reward ─────────────────────────────────────────────────────────────────────────────────

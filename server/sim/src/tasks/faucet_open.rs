@@ -57,7 +57,7 @@ pub const TASK: Task = Task {
     make: metaworld::make::<FaucetOpen>,
     scene,
     place,
-    expert,
+    expert: Some(expert),
 };
 
 // ── Reward ─────────────────────────────────────────────────────────────────────────────────

@@ -87,7 +87,7 @@ pub const TASK: Task = Task {
     make: || Box::new(GoFetchReturn::new()),
     scene: picture::scene,
     place: picture::place,
-    expert,
+    expert: Some(expert),
 };
 
 const NAME: &str = "go-fetch-return";

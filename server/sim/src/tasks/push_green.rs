@@ -55,7 +55,7 @@ pub const TASK: Task = Task {
     make: || Box::new(PushGreen::new()),
     scene,
     place,
-    expert,
+    expert: Some(expert),
 };
 
 /// Numbers that describe one moment; an observation holds two of them.

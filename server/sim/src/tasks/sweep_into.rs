@@ -56,7 +56,7 @@ pub const TASK: Task = Task {
     make: metaworld::make::<SweepInto>,
     scene,
     place,
-    expert,
+    expert: Some(expert),
 };
 
 // ── Reward ─────────────────────────────────────────────────────────────────────────────────

@@ -52,7 +52,7 @@ pub const TASK: Task = Task {
     make: metaworld::make::<WindowClose>,
     scene,
     place,
-    expert,
+    expert: Some(expert),
 };
 
 /// The task's point on the handle, right of its grip, seen from the pane.

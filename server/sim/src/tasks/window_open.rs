@@ -52,7 +52,7 @@ pub const TASK: Task = Task {
     make: metaworld::make::<WindowOpen>,
     scene,
     place,
-    expert,
+    expert: Some(expert),
 };
 
 /// The task's point on the handle, left of its grip, seen from the pane.
