@@ -4,6 +4,7 @@
 //! [`message`] and [`domain::teacher::Teacher`] alone; a method is a recipe of parts.
 
 pub mod config;
+pub mod cost;
 pub mod evaluate;
 pub mod experiment;
 pub mod figure;

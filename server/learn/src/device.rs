@@ -82,6 +82,22 @@ fn keep_freed_memory() {
 #[cfg(not(all(target_os = "linux", target_env = "gnu")))]
 fn keep_freed_memory() {}
 
+/// The rate of a 512³ product in single precision on one core of this machine, 10⁹
+/// multiplications and additions a second: the best of a few, so that other work on the machine
+/// disturbs little.
+pub fn gigaflop_per_second() -> f64 {
+    const N: i64 = 512;
+    init();
+    let a = tch::Tensor::ones([N, N], (tch::Kind::Float, tch::Device::Cpu));
+    let seconds = (0..8).map(|_| {
+        let began = std::time::Instant::now();
+        let _ = a.matmul(&a);
+        began.elapsed().as_secs_f64()
+    });
+    let gigaflop = 2.0 * (N as f64).powi(3) / 1e9;
+    gigaflop / seconds.fold(f64::INFINITY, f64::min).max(1e-9)
+}
+
 static N_SWITCH_CALLS: AtomicU64 = AtomicU64::new(0);
 
 /// How often MKL has asked the switch below; zero after a matrix product means that the

@@ -78,6 +78,8 @@ async fn serve(args: Args) -> anyhow::Result<()> {
     let address = listener
         .local_addr()
         .context("cannot read the server's address")?;
+    // Pages tell how long a run takes on this machine; nobody should wait for its first measure.
+    tokio::task::spawn_blocking(lab::cost::gigaflop_per_second);
     let live = Live::start(store.clone()).await?;
     let router = router(AppState::new(store, live.clone(), token.is_some()));
     announce(&args, address, token.as_ref());

@@ -6,6 +6,7 @@ use askama::Template;
 use axum::extract::{Form, State};
 use axum::response::{Redirect, Response};
 use lab::config::{Layers, RunConfig};
+use lab::cost::time_here;
 use serde::Deserialize;
 use serde_json::{Map, json};
 
@@ -187,7 +188,7 @@ fn card(task: &'static sim::tasks::Task) -> TaskCard {
         summary: task.summary,
         picture: picture(task.name),
         labels: format!("about {} answers", thousands(budget.into())),
-        minutes: words_for(practice(task.name, config.training.total_steps) + ANSWER * budget),
+        minutes: words_for(time_here(&config, &(task.spec)()) + ANSWER * budget),
         budget,
     }
 }
@@ -197,13 +198,6 @@ fn picture(task: &str) -> String {
     let names = ["webp", "svg"].map(|kind| format!("cards/{task}.{kind}"));
     let found = names.into_iter().find(|name| assets::contains(name));
     format!("/static/{}", found.as_deref().unwrap_or("cards/any.svg"))
-}
-
-/// Time that the agent itself takes on two cores: steps over the measured speed of the quick
-/// presets (400 and 125 steps a second).
-fn practice(task: &str, total_steps: u64) -> Duration {
-    let steps_per_s = if task == "go-fetch-return" { 400 } else { 125 };
-    Duration::from_secs(total_steps / steps_per_s)
 }
 
 /// `about 10 minutes`, `about 2 hours`.

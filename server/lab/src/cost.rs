@@ -1,0 +1,118 @@
+//! What a run's arithmetic comes to, and about how long this machine takes for it.
+
+use std::sync::OnceLock;
+use std::time::Duration;
+
+use domain::environment::EnvSpec;
+use domain::schedule::FeedbackSchedule;
+
+use crate::config::RunConfig;
+use crate::method;
+
+/// Share of the rate of plain products that whole updates reach (see learn's PERFORMANCE.md:
+/// 0.65 to 0.86), less what a run does beside them.
+const SHARE: f64 = 0.55;
+/// Acting, physics and storing, seconds a control step.
+const STEP_S: f64 = 0.000_15;
+
+/// About how long the agent itself takes on this machine, without waiting for answers.
+pub fn time_here(config: &RunConfig, spec: &EnvSpec) -> Duration {
+    let arithmetic = gigaflop(config, spec) / (SHARE * gigaflop_per_second());
+    Duration::from_secs_f64(arithmetic + STEP_S * config.training.total_steps as f64)
+}
+
+/// This machine's rate of plain products, measured once (a few hundredths of a second).
+pub fn gigaflop_per_second() -> f64 {
+    static RATE: OnceLock<f64> = OnceLock::new();
+    *RATE.get_or_init(learn::device::gigaflop_per_second)
+}
+
+/// Matrix products of a whole run with all its answers, 10⁹ multiplications and additions.
+///
+/// The temporal distance is left out: it runs beside the agent's updates and is the smaller.
+pub fn gigaflop(config: &RunConfig, spec: &EnvSpec) -> f64 {
+    let t = &config.training;
+    let updates = t.total_steps.saturating_sub(t.seed_steps) as f64 * t.updates_per_step;
+    let asks = method::find(&config.method).is_ok_and(|m| (m.build)(config).sampler.is_some());
+    let fits = if asks { fits(config, spec) } else { 0.0 };
+    (updates * sac_update(config, spec) + fits) / 1e9
+}
+
+/// Of one update of critics, actor and target.
+///
+/// With c and p weights in a critic and in the actor, each row takes 2c for the targets' values,
+/// 6c for the critics' way there and back, 4c for the actor's way through them, and 4p for the
+/// actor (next actions, actions, way back), twice two operations each.
+fn sac_update(config: &RunConfig, spec: &EnvSpec) -> f64 {
+    let (s, a) = (spec.observation_size, spec.action_size);
+    let critic = weights(s + a, &config.agent.hidden, 1);
+    let actor = weights(s, &config.agent.hidden, 2 * a);
+    2.0 * config.agent.batch as f64 * (12.0 * critic + 4.0 * actor)
+}
+
+/// Of all fits of the reward ensemble, each to all answers so far, and of relabelling after each.
+fn fits(config: &RunConfig, spec: &EnvSpec) -> f64 {
+    let reward = &config.reward;
+    let row = 2.0
+        * reward.members as f64
+        * weights(spec.observation_size + spec.action_size, &reward.hidden, 1);
+    let rows_per_label = 2.0 * f64::from(config.segment_len(spec));
+    let feedback: &FeedbackSchedule = &config.feedback;
+    let (mut total, mut labels) = (0.0, 0);
+    for session in 0.. {
+        let step = feedback.step_of(session);
+        if step >= config.training.total_steps || labels >= feedback.budget {
+            break;
+        }
+        labels += feedback.session_size(labels);
+        let passes = f64::from(reward.max_epochs) * 3.0; // there, and twice as much back
+        total += row * (passes * rows_per_label * f64::from(labels) + step as f64);
+    }
+    total
+}
+
+/// Weights of a perceptron without its biases.
+fn weights(n_in: usize, hidden: &[i64], n_out: usize) -> f64 {
+    let mut sizes = vec![n_in as f64];
+    sizes.extend(hidden.iter().map(|&n| n as f64));
+    sizes.push(n_out as f64);
+    sizes.windows(2).map(|pair| pair[0] * pair[1]).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::Layers;
+
+    fn resolved(method: &str, preset: &str) -> (RunConfig, EnvSpec) {
+        let layers = Layers {
+            task: Some("window-open".into()),
+            method: Some(method.into()),
+            presets: (!preset.is_empty())
+                .then(|| preset.to_owned())
+                .into_iter()
+                .collect(),
+            ..Layers::default()
+        };
+        let config = RunConfig::resolve(&layers).expect("a preset");
+        let spec = (crate::config::find_task(&config.task).expect("a task").spec)();
+        (config, spec)
+    }
+
+    #[test]
+    fn an_update_of_the_released_sizes_takes_the_known_2_3_gigaflop() {
+        let (config, spec) = resolved("sac", "");
+        let gigaflop = sac_update(&config, &spec) / 1e9;
+        assert!((gigaflop - 2.30).abs() < 0.05, "{gigaflop}");
+    }
+
+    #[test]
+    fn methods_that_ask_cost_more_and_quick_presets_less() {
+        let total = |method, preset| {
+            let (config, spec) = resolved(method, preset);
+            gigaflop(&config, &spec)
+        };
+        assert!(total("stair", "") > 1.2 * total("sac", ""));
+        assert!(total("stair", "quick") < 0.1 * total("stair", ""));
+    }
+}
