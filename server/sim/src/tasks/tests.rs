@@ -168,12 +168,12 @@ impl Violence {
         for value in action {
             match self {
                 Self::Random => *value = rng.uniform_in(-1.0, 1.0) as f32,
-                Self::FullSpeed(n_kept) if index % n_kept == 0 => {
+                Self::FullSpeed(n_kept) if index.is_multiple_of(n_kept) => {
                     *value = rng.uniform_in(-1.0, 1.0).signum() as f32;
                 }
                 Self::FullSpeed(_) => {}
                 Self::Held(held) => *value = held,
-                Self::Alternating => *value = if index % 2 == 0 { 1.0 } else { -1.0 },
+                Self::Alternating => *value = if index.is_multiple_of(2) { 1.0 } else { -1.0 },
             }
         }
     }

@@ -11,6 +11,9 @@ use crate::tasks::window::{self, WindowReading};
 use crate::tasks::window_close::{self, WindowClose};
 use crate::tasks::window_open::{self, WindowOpen};
 
+/// Where the object's root is and actions, to the states they lead to.
+type Play = fn(Point, &[Vec<f32>]) -> Result<Vec<Replayed>, String>;
+
 /// How a task's recordings are replayed.
 pub(in crate::golden) struct TaskRecordings {
     pub(in crate::golden) name: &'static str,
@@ -21,7 +24,7 @@ pub(in crate::golden) struct TaskRecordings {
     /// Whether the reward looks at the fingers' pads, which trajectory lines do not tell.
     pub(super) needs_pads: bool,
     /// Plays recorded actions in our own physics, the object's root where it was recorded.
-    pub(in crate::golden) replay: fn(Point, &[Vec<f32>]) -> Result<Vec<Replayed>, String>,
+    pub(in crate::golden) replay: Play,
     /// How far the object moves in a solved episode: metres, radians.
     pub(in crate::golden) travel: f64,
 }

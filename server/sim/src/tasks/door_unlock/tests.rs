@@ -16,7 +16,7 @@ fn the_worked_example_of_the_reward_holds() {
         init_tcp: [0.006_00, 0.600_48, 0.149_35],
         object: Lock {
             root,
-            angle: 0.608_58,
+            angle: angle_of(root, [0.075_053, 0.655_918, 0.149_398]),
         },
     };
     let judgement = DoorUnlock::judge(&readings);
