@@ -42,11 +42,12 @@ async function start() {
   outbox = await Outbox.open(run);
   answered = await outbox.answeredLeases();
   history = await outbox.history();
-  ready = new ReadyPairs(run, (leaseId) => answered.has(leaseId));
+  const shown = () => [current, interrupted].filter(Boolean).map((pair) => pair.lease.lease_id);
+  ready = new ReadyPairs(run, (leaseId) => answered.has(leaseId), shown);
   listen();
   tellShortcuts();
   greet();
-  await ready.refill(null);
+  await ready.refill();
   proceed();
 }
 
@@ -60,6 +61,7 @@ function proceed() {
   if (next) show(next, null);
   else {
     pressedAt = 0;
+    if (page.dataset.stage === 'working') tellWaiting({ kind: 'open' });
     setStage('waiting');
     refill();
   }
@@ -68,7 +70,6 @@ function proceed() {
 function show(pair, before) {
   current = pair;
   isChanging = before !== null;
-  ready.shown = isChanging ? ready.shown : pair.lease.lease_id;
   const isStage = pair.lease.question === 'same_stage';
   page.dataset.question = pair.lease.question;
   $('question').textContent = isStage ? 'Are both at the same stage of the task?' : 'Which one does better?';
@@ -117,14 +118,15 @@ function answer(word, input, reason = null, pressed = performance.now()) {
   const kept = wasChange ? outbox.change(pair.lease, body) : keepFirst(pair, body);
   proceed();
   releasePair(pair);
-  kept
-    .then(() => refill())
-    .catch((failure) => notice(`This browser could not keep the answer: ${failure.message}`, true));
+  kept.catch((failure) => notice(`This browser could not keep the answer: ${failure.message}`, true));
 }
 
 async function keepFirst(pair, body) {
-  answered.add(pair.lease.lease_id);
-  history.push({ lease_id: pair.lease.lease_id, lease: pair.lease, answer: body.answer });
+  const { lease_id } = pair.lease;
+  answered.add(lease_id);
+  ready.drop(lease_id);
+  history = history.filter((row) => row.lease_id !== lease_id);
+  history.push({ lease_id, lease: pair.lease, answer: body.answer });
   $('undo').disabled = undoable() === null;
   const isNew = await outbox.answer(pair.lease, body);
   if (isNew) tabs.postMessage(pair.lease.lease_id);
@@ -150,6 +152,7 @@ async function undo() {
     notice(`That pair can no longer be shown: ${reason.message}`, true);
   } finally {
     isTurningBack = false;
+    if (!current) proceed();
   }
 }
 
@@ -178,7 +181,6 @@ async function skipBroken({ lease, reason }) {
     timing: { visible_ms: 0, hidden_ms: 0, loops: 0, seeks: 0, speed: 1, dropped_frames: 0, input: 'key' },
   });
   notice('One pair could not be shown and was passed over. The researcher is told.', true);
-  refill();
 }
 
 // --- the server's words ------------------------------------------------------------------------
@@ -187,7 +189,7 @@ let refillTimer = 0;
 
 async function refill() {
   clearTimeout(refillTimer);
-  await ready.refill(current?.lease.lease_id ?? interrupted?.lease.lease_id);
+  await ready.refill();
   if (!current) proceedIfReady();
   const isIdle = !current && !ready.isPreparing;
   if (isIdle) refillTimer = setTimeout(refill, WAITING_MS);
@@ -310,9 +312,15 @@ function listen() {
   ready.addEventListener('broken', ({ detail }) => skipBroken(detail));
   ready.addEventListener('offline', () => offline());
   ready.addEventListener('refused', ({ detail }) => refused(detail));
-  outbox.addEventListener('saved', ({ detail }) => tellSaved(detail.stored_at));
+  outbox.addEventListener('saved', ({ detail }) => {
+    tellSaved(detail.stored_at);
+    refill(); // only now does the server count this answer
+  });
   outbox.addEventListener('waiting', ({ detail }) => tellWaitingAnswers(detail));
-  outbox.addEventListener('refused', ({ detail }) => notice(detail.message, true));
+  outbox.addEventListener('refused', ({ detail }) => {
+    notice(detail.message, true);
+    refill();
+  });
   tabs.addEventListener('message', ({ data }) => answeredElsewhere(data));
   guidance.addEventListener('close', () => {
     localStorage.setItem('stair-guidance', page.dataset.guidance);
@@ -338,6 +346,10 @@ function refused(problem) {
 function answeredElsewhere(leaseId) {
   answered.add(leaseId);
   ready.drop(leaseId);
+  if (interrupted?.lease.lease_id === leaseId) {
+    releasePair(interrupted);
+    interrupted = null;
+  }
   if (current?.lease.lease_id !== leaseId || isChanging) return;
   const leaving = current;
   current = null;
