@@ -211,21 +211,25 @@ function tellProgress({ state, progress }) {
 
 const HEADINGS = {
   open: 'The next pair is on its way',
+  saving: 'Saving your answer',
+  offline: 'No connection to the server',
   drawing: 'Drawing the next clips',
   waiting: 'The agent is practising',
   held: 'Others are on the remaining pairs',
   done: 'All done — thank you',
-  paused: 'Paused by the researcher',
-  failed: 'This run has stopped',
+  paused: 'Paused for now',
+  failed: 'This run cannot go on',
 };
 
 function tellWaiting(state) {
   const card = $('waiting');
   if (card.dataset.kind !== state.kind) curveAt = 0;
   card.dataset.kind = state.kind;
-  setText('waiting-title', HEADINGS[state.kind] ?? state.kind);
+  // Questions that are open for the server, none of them left here: its word on the last answer is due.
+  const isSaving = state.kind === 'open' && !ready.isPreparing;
+  setText('waiting-title', HEADINGS[isSaving ? 'saving' : state.kind] ?? state.kind);
   const until = state.until ? ` Until ${timeOfDay(state.until).slice(0, 5)}.` : '';
-  setText('waiting-text', `${state.message ?? ''}${until}`);
+  setText('waiting-text', state.kind === 'open' ? '' : `${state.message ?? ''}${until}`);
   const progress = state.phase?.progress;
   const hasProgress = typeof progress === 'number' && state.kind === 'waiting';
   $('waiting-bar').hidden = !hasProgress;
@@ -267,7 +271,7 @@ function tellWaitingAnswers({ count, isOffline }) {
   if (count === 0) return;
   $('saved').dataset.state = 'unsent';
   const what = count === 1 ? '1 answer is kept here' : `${count} answers are kept here`;
-  setText('saved', `${isOffline ? 'no connection' : 'the server is busy'}: ${what} and sent again`);
+  setText('saved', isOffline ? `no connection: ${what} and will be sent when it is back` : `the server is busy: ${what} and will be sent soon`);
 }
 
 let noticeTimer = 0;
@@ -335,7 +339,7 @@ function listen() {
 
 function offline() {
   if (current) return;
-  tellWaiting({ kind: 'open', message: 'There is no connection to the server. This page tries again by itself.' });
+  tellWaiting({ kind: 'offline', message: 'No pair is left to show here. This page tries again by itself, and every answer is kept.' });
 }
 
 function refused(problem) {

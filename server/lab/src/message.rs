@@ -51,6 +51,8 @@ pub struct Phase {
     pub step: u64,
     /// Environment steps in all.
     pub total_steps: u64,
+    /// Environment step at which the activity began: that of the session before, or 0.
+    pub from_step: u64,
     /// Environment step at which the activity ends, where it is known.
     pub until_step: Option<u64>,
     /// Answers received in the open session and answers it needs, while asking.

@@ -186,6 +186,7 @@ mod tests {
             activity,
             step: 12_400,
             total_steps: 40_000,
+            from_step: 0,
             until_step,
             session_answers,
         };
