@@ -101,7 +101,8 @@ pub struct Metrics {
     pub entropy: Option<f64>,
     /// `InfoNCE` loss of the temporal distance.
     pub temporal_loss: Option<f64>,
-    /// Environment steps per second of wall time in the interval.
+    /// Environment steps per second of wall time in the interval, pauses and waiting for answers
+    /// left out.
     pub steps_per_s: f64,
 }
 

@@ -257,7 +257,7 @@ impl Run {
                 self.learn_from_session(events)?;
             } else if self.stands_still() {
                 self.say_activity(events);
-                std::thread::sleep(REST);
+                self.meter.rest(REST);
             } else if self.asks_now() {
                 self.ask(teacher, events)?;
             } else {
