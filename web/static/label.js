@@ -2,7 +2,7 @@
 import { Problem, request, timeOfDay } from './api.js';
 import { drawCurve, foldEvents } from './chart.js';
 import { Outbox } from './outbox.js';
-import { StairPair } from './pair.js';
+import './pair.js';
 import { preparePair, ReadyPairs, releasePair } from './ready.js';
 
 const KEYS = {
@@ -31,6 +31,8 @@ let interrupted = null;
 let history = [];
 /** An answered pair is being fetched again; what is on stays on and takes no answer. */
 let isTurningBack = false;
+/** The clips played when the guidance covered them. */
+let playsOn = false;
 let shownAt = 0;
 let pressedAt = 0;
 let answered = new Set();
@@ -80,6 +82,7 @@ function show(pair, before) {
   page.dataset.shown = '';
   setStage('working');
   player.show(pair.left, pair.right);
+  if (guidance.open) holdClips();
 }
 
 function setStage(stage) {
@@ -295,6 +298,25 @@ function greet() {
   guidance.showModal();
 }
 
+/** Once more, in the middle of it. */
+function openGuidance() {
+  $('close-guidance').textContent = 'Go on';
+  holdClips();
+  guidance.showModal();
+}
+
+function holdClips() {
+  if (!player.playing) return;
+  player.toggle();
+  playsOn = true;
+}
+
+function guidanceClosed() {
+  localStorage.setItem('stair-guidance', page.dataset.guidance);
+  if (playsOn && current && !player.playing) player.toggle();
+  playsOn = false;
+}
+
 function tellShortcuts() {
   $('shortcuts').checked = usesShortcuts;
   page.toggleAttribute('data-no-shortcuts', !usesShortcuts);
@@ -326,10 +348,7 @@ function listen() {
     refill();
   });
   tabs.addEventListener('message', ({ data }) => answeredElsewhere(data));
-  guidance.addEventListener('close', () => {
-    localStorage.setItem('stair-guidance', page.dataset.guidance);
-    if (current && !StairPair.wantsStillness) player.restart();
-  });
+  guidance.addEventListener('close', guidanceClosed);
   $('shortcuts').addEventListener('change', () => {
     usesShortcuts = $('shortcuts').checked;
     localStorage.setItem('stair-shortcuts', usesShortcuts ? 'on' : 'off');
@@ -370,7 +389,7 @@ function keyPressed(event) {
     if (event.key === '?') guidance.close();
     return;
   }
-  if (event.key === '?') return act(event, () => guidance.showModal());
+  if (event.key === '?') return act(event, openGuidance);
   const isField = event.target.matches('input, textarea, select');
   const isScrub = event.target.dataset?.do === 'scrub';
   if (isField && !isScrub) return;
@@ -414,7 +433,7 @@ function clicked(event) {
   else if (button.id === 'undo') undo();
   else if (button.id === 'unsure') askReason();
   else if (button.id === 'leave') leaveUnchanged();
-  else if (button.id === 'help') guidance.showModal();
+  else if (button.id === 'help') openGuidance();
   else if (button.dataset.close !== undefined) button.closest('dialog').close();
 }
 
