@@ -43,7 +43,7 @@ pub struct StateLine {
     pub kind: StateKind,
     /// What it is doing.
     pub message: String,
-    /// What comes after.
+    /// What comes after; empty where nothing does.
     pub next: String,
 }
 
@@ -125,11 +125,7 @@ impl StateLine {
             thousands(finished.step),
             plural(labels, "answer", "answers")
         );
-        Self::of(
-            StateKind::Finished,
-            message,
-            "nothing: the agent is trained",
-        )
+        Self::of(StateKind::Finished, message, "")
     }
 
     /// A command ended it.
