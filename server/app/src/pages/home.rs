@@ -237,10 +237,21 @@ fn words_for(time: Duration) -> String {
 fn methods() -> Vec<Choice> {
     let choice = |method: &lab::method::MethodEntry| Choice {
         value: method.name,
-        words: format!("{}: {}", method_name(method.name), method.summary),
+        words: format!("{}: {}", method_name(method.name), choosing(method)),
         is_default: method.name == "stair",
     };
     lab::method::METHODS.iter().map(choice).collect()
+}
+
+/// How a method chooses its queries, short enough for a small phone.
+fn choosing(method: &lab::method::MethodEntry) -> &'static str {
+    match method.name {
+        "stair" => "within a stage",
+        "pebble" => "where unsure",
+        "uniform" => "at random",
+        "sac" => "none, sees the reward",
+        _ => method.summary,
+    }
 }
 
 /// `stair` → `STAIR`; methods are acronyms, all but one.
@@ -256,14 +267,14 @@ fn teachers() -> Vec<Choice> {
     let all = [
         (HUMAN, "People, on these pages"),
         ("oracle", "A script that never errs"),
-        ("mistaken", "A script that errs now and then"),
+        ("mistaken", "A script that may err"),
     ];
     choices(&all)
 }
 
 fn presets() -> Vec<Choice> {
     choices(&[
-        ("quick", "Quick: for two cores and people"),
+        ("quick", "Quick: for two cores"),
         ("", "As in the paper"),
     ])
 }
