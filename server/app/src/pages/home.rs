@@ -273,10 +273,7 @@ fn teachers() -> Vec<Choice> {
 }
 
 fn presets() -> Vec<Choice> {
-    choices(&[
-        ("quick", "Quick: for two cores"),
-        ("", "As in the paper"),
-    ])
+    choices(&[("quick", "Quick: for two cores"), ("", "As in the paper")])
 }
 
 /// The first is the default.
