@@ -184,6 +184,7 @@ async function skipBroken({ lease, reason }) {
     timing: { visible_ms: 0, hidden_ms: 0, loops: 0, seeks: 0, speed: 1, dropped_frames: 0, input: 'key' },
   });
   notice('One pair could not be shown and was passed over. The researcher is told.', true);
+  refill();
 }
 
 // --- the server's words ------------------------------------------------------------------------
@@ -195,6 +196,7 @@ async function refill() {
   await ready.refill();
   if (!current) proceedIfReady();
   const isIdle = !current && !ready.isPreparing;
+  clearTimeout(refillTimer); // several may have waited for the same reply
   if (isIdle) refillTimer = setTimeout(refill, WAITING_MS);
 }
 
@@ -373,6 +375,7 @@ function answeredElsewhere(leaseId) {
     releasePair(interrupted);
     interrupted = null;
   }
+  if (!current) refill();
   if (current?.lease.lease_id !== leaseId || isChanging) return;
   const leaving = current;
   current = null;
