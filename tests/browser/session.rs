@@ -106,6 +106,41 @@ async fn an_answer_can_be_gone_back_to_and_changed() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn a_pair_is_shown_once_however_late_the_server_replies() {
+    let Some(browser) = Browser::open(Scheme::Light, SCREEN).await else {
+        return;
+    };
+    let desk = Desk::set_up(12).await;
+    desk.sit_down(&browser).await;
+    let delay = "const send = fetch; window.fetch = async (url, how) => {
+        const reply = await send(url, how);
+        if (String(url).endsWith('/leases')) await new Promise((resolve) => setTimeout(resolve, 900));
+        return reply;
+    };";
+    browser.run(delay, vec![]).await;
+
+    let mut shown = Vec::new();
+    for index in 0..8 {
+        browser
+            .until("document.body.dataset.stage === 'working' && document.body.dataset.shown")
+            .await;
+        shown.push(
+            browser
+                .value("document.body.dataset.shown")
+                .await
+                .to_string(),
+        );
+        answer_any(&browser, index).await;
+    }
+    wait_until_stored(&browser).await;
+
+    let n_shown = shown.len();
+    shown.sort();
+    shown.dedup();
+    assert_eq!((shown.len(), desk.stored().len()), (n_shown, n_shown));
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn answers_given_without_a_connection_are_stored_once_it_is_back() {
     let Some(browser) = Browser::open(Scheme::Light, SCREEN).await else {
         return;

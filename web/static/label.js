@@ -2,7 +2,7 @@
 import { Problem, request, timeOfDay } from './api.js';
 import { drawCurve, foldEvents } from './chart.js';
 import { Outbox } from './outbox.js';
-import { StairPair } from './pair.js';
+import './pair.js';
 import { preparePair, ReadyPairs, releasePair } from './ready.js';
 
 const KEYS = {
@@ -31,6 +31,8 @@ let interrupted = null;
 let history = [];
 /** An answered pair is being fetched again; what is on stays on and takes no answer. */
 let isTurningBack = false;
+/** The clips played when the guidance covered them. */
+let playsOn = false;
 let shownAt = 0;
 let pressedAt = 0;
 let answered = new Set();
@@ -42,11 +44,12 @@ async function start() {
   outbox = await Outbox.open(run);
   answered = await outbox.answeredLeases();
   history = await outbox.history();
-  ready = new ReadyPairs(run, (leaseId) => answered.has(leaseId));
+  const shown = () => [current, interrupted].filter(Boolean).map((pair) => pair.lease.lease_id);
+  ready = new ReadyPairs(run, (leaseId) => answered.has(leaseId), shown);
   listen();
   tellShortcuts();
   greet();
-  await ready.refill(null);
+  await ready.refill();
   proceed();
 }
 
@@ -60,6 +63,7 @@ function proceed() {
   if (next) show(next, null);
   else {
     pressedAt = 0;
+    if (page.dataset.stage === 'working') tellWaiting({ kind: 'open' });
     setStage('waiting');
     refill();
   }
@@ -68,7 +72,6 @@ function proceed() {
 function show(pair, before) {
   current = pair;
   isChanging = before !== null;
-  ready.shown = isChanging ? ready.shown : pair.lease.lease_id;
   const isStage = pair.lease.question === 'same_stage';
   page.dataset.question = pair.lease.question;
   $('question').textContent = isStage ? 'Are both at the same stage of the task?' : 'Which one does better?';
@@ -79,6 +82,7 @@ function show(pair, before) {
   page.dataset.shown = '';
   setStage('working');
   player.show(pair.left, pair.right);
+  if (guidance.open) holdClips();
 }
 
 function setStage(stage) {
@@ -117,14 +121,15 @@ function answer(word, input, reason = null, pressed = performance.now()) {
   const kept = wasChange ? outbox.change(pair.lease, body) : keepFirst(pair, body);
   proceed();
   releasePair(pair);
-  kept
-    .then(() => refill())
-    .catch((failure) => notice(`This browser could not keep the answer: ${failure.message}`, true));
+  kept.catch((failure) => notice(`This browser could not keep the answer: ${failure.message}`, true));
 }
 
 async function keepFirst(pair, body) {
-  answered.add(pair.lease.lease_id);
-  history.push({ lease_id: pair.lease.lease_id, lease: pair.lease, answer: body.answer });
+  const { lease_id } = pair.lease;
+  answered.add(lease_id);
+  ready.drop(lease_id);
+  history = history.filter((row) => row.lease_id !== lease_id);
+  history.push({ lease_id, lease: pair.lease, answer: body.answer });
   $('undo').disabled = undoable() === null;
   const isNew = await outbox.answer(pair.lease, body);
   if (isNew) tabs.postMessage(pair.lease.lease_id);
@@ -150,6 +155,7 @@ async function undo() {
     notice(`That pair can no longer be shown: ${reason.message}`, true);
   } finally {
     isTurningBack = false;
+    if (!current) proceed();
   }
 }
 
@@ -187,9 +193,10 @@ let refillTimer = 0;
 
 async function refill() {
   clearTimeout(refillTimer);
-  await ready.refill(current?.lease.lease_id ?? interrupted?.lease.lease_id);
+  await ready.refill();
   if (!current) proceedIfReady();
   const isIdle = !current && !ready.isPreparing;
+  clearTimeout(refillTimer); // several may have waited for the same reply
   if (isIdle) refillTimer = setTimeout(refill, WAITING_MS);
 }
 
@@ -209,21 +216,25 @@ function tellProgress({ state, progress }) {
 
 const HEADINGS = {
   open: 'The next pair is on its way',
+  saving: 'Saving your answer',
+  offline: 'No connection to the server',
   drawing: 'Drawing the next clips',
   waiting: 'The agent is practising',
   held: 'Others are on the remaining pairs',
   done: 'All done — thank you',
-  paused: 'Paused by the researcher',
-  failed: 'This run has stopped',
+  paused: 'Paused for now',
+  failed: 'This run cannot go on',
 };
 
 function tellWaiting(state) {
   const card = $('waiting');
   if (card.dataset.kind !== state.kind) curveAt = 0;
   card.dataset.kind = state.kind;
-  setText('waiting-title', HEADINGS[state.kind] ?? state.kind);
+  // Questions that are open for the server, none of them left here: its word on the last answer is due.
+  const isSaving = state.kind === 'open' && !ready.isPreparing;
+  setText('waiting-title', HEADINGS[isSaving ? 'saving' : state.kind] ?? state.kind);
   const until = state.until ? ` Until ${timeOfDay(state.until).slice(0, 5)}.` : '';
-  setText('waiting-text', `${state.message ?? ''}${until}`);
+  setText('waiting-text', state.kind === 'open' ? '' : `${state.message ?? ''}${until}`);
   const progress = state.phase?.progress;
   const hasProgress = typeof progress === 'number' && state.kind === 'waiting';
   $('waiting-bar').hidden = !hasProgress;
@@ -265,7 +276,7 @@ function tellWaitingAnswers({ count, isOffline }) {
   if (count === 0) return;
   $('saved').dataset.state = 'unsent';
   const what = count === 1 ? '1 answer is kept here' : `${count} answers are kept here`;
-  setText('saved', `${isOffline ? 'no connection' : 'the server is busy'}: ${what} and sent again`);
+  setText('saved', isOffline ? `no connection: ${what} and will be sent when it is back` : `the server is busy: ${what} and will be sent soon`);
 }
 
 let noticeTimer = 0;
@@ -289,6 +300,25 @@ function greet() {
   guidance.showModal();
 }
 
+/** Once more, in the middle of it. */
+function openGuidance() {
+  $('close-guidance').textContent = 'Go on';
+  holdClips();
+  guidance.showModal();
+}
+
+function holdClips() {
+  if (!player.playing) return;
+  player.toggle();
+  playsOn = true;
+}
+
+function guidanceClosed() {
+  localStorage.setItem('stair-guidance', page.dataset.guidance);
+  if (playsOn && current && !player.playing) player.toggle();
+  playsOn = false;
+}
+
 function tellShortcuts() {
   $('shortcuts').checked = usesShortcuts;
   page.toggleAttribute('data-no-shortcuts', !usesShortcuts);
@@ -310,14 +340,17 @@ function listen() {
   ready.addEventListener('broken', ({ detail }) => skipBroken(detail));
   ready.addEventListener('offline', () => offline());
   ready.addEventListener('refused', ({ detail }) => refused(detail));
-  outbox.addEventListener('saved', ({ detail }) => tellSaved(detail.stored_at));
-  outbox.addEventListener('waiting', ({ detail }) => tellWaitingAnswers(detail));
-  outbox.addEventListener('refused', ({ detail }) => notice(detail.message, true));
-  tabs.addEventListener('message', ({ data }) => answeredElsewhere(data));
-  guidance.addEventListener('close', () => {
-    localStorage.setItem('stair-guidance', page.dataset.guidance);
-    if (current && !StairPair.wantsStillness) player.restart();
+  outbox.addEventListener('saved', ({ detail }) => {
+    tellSaved(detail.stored_at);
+    refill(); // only now does the server count this answer
   });
+  outbox.addEventListener('waiting', ({ detail }) => tellWaitingAnswers(detail));
+  outbox.addEventListener('refused', ({ detail }) => {
+    notice(detail.message, true);
+    refill();
+  });
+  tabs.addEventListener('message', ({ data }) => answeredElsewhere(data));
+  guidance.addEventListener('close', guidanceClosed);
   $('shortcuts').addEventListener('change', () => {
     usesShortcuts = $('shortcuts').checked;
     localStorage.setItem('stair-shortcuts', usesShortcuts ? 'on' : 'off');
@@ -327,7 +360,7 @@ function listen() {
 
 function offline() {
   if (current) return;
-  tellWaiting({ kind: 'open', message: 'There is no connection to the server. This page tries again by itself.' });
+  tellWaiting({ kind: 'offline', message: 'No pair is left to show here. This page tries again by itself, and every answer is kept.' });
 }
 
 function refused(problem) {
@@ -338,6 +371,11 @@ function refused(problem) {
 function answeredElsewhere(leaseId) {
   answered.add(leaseId);
   ready.drop(leaseId);
+  if (interrupted?.lease.lease_id === leaseId) {
+    releasePair(interrupted);
+    interrupted = null;
+  }
+  if (!current) refill();
   if (current?.lease.lease_id !== leaseId || isChanging) return;
   const leaving = current;
   current = null;
@@ -354,7 +392,7 @@ function keyPressed(event) {
     if (event.key === '?') guidance.close();
     return;
   }
-  if (event.key === '?') return act(event, () => guidance.showModal());
+  if (event.key === '?') return act(event, openGuidance);
   const isField = event.target.matches('input, textarea, select');
   const isScrub = event.target.dataset?.do === 'scrub';
   if (isField && !isScrub) return;
@@ -398,7 +436,7 @@ function clicked(event) {
   else if (button.id === 'undo') undo();
   else if (button.id === 'unsure') askReason();
   else if (button.id === 'leave') leaveUnchanged();
-  else if (button.id === 'help') guidance.showModal();
+  else if (button.id === 'help') openGuidance();
   else if (button.dataset.close !== undefined) button.closest('dialog').close();
 }
 

@@ -34,17 +34,21 @@ export function releasePair(pair) {
 export class ReadyPairs extends EventTarget {
   #run;
   #isAnswered;
+  #shown;
   #entries = [];
   #asking = null;
+  #isToAskAgain = false;
 
   /**
    * @param {string} run
    * @param {(leaseId: string) => boolean} isAnswered leases that must not be shown again
+   * @param {() => string[]} shown leases that the page holds at this moment
    */
-  constructor(run, isAnswered) {
+  constructor(run, isAnswered, shown) {
     super();
     this.#run = run;
     this.#isAnswered = isAnswered;
+    this.#shown = shown;
     setInterval(() => this.#heartbeat(), HEARTBEAT_MS);
   }
 
@@ -60,11 +64,14 @@ export class ReadyPairs extends EventTarget {
 
   /** Takes the next pair, in the server's order, or null when it is not decoded yet. */
   take() {
+    for (const { lease } of [...this.#entries]) {
+      if (this.#isTaken(lease.lease_id)) this.drop(lease.lease_id);
+    }
     if (!this.#entries[0]?.pair) return null;
     return this.#entries.shift().pair;
   }
 
-  /** Forgets a lease that somebody has answered elsewhere. */
+  /** Forgets a lease that is answered, here or elsewhere. */
   drop(leaseId) {
     const entry = this.#entries.find((candidate) => candidate.lease.lease_id === leaseId);
     if (!entry) return;
@@ -72,16 +79,31 @@ export class ReadyPairs extends EventTarget {
     releasePair(entry.pair);
   }
 
-  /** Asks the server for leases up to count, and prepares the new ones. `shown` is on the page. */
-  async refill(shown) {
-    if (this.#asking) return this.#asking;
-    this.#asking = this.#ask(shown).finally(() => {
+  /**
+   * Asks the server for leases up to count, and prepares the new ones. Called while a question is
+   * under way, it asks once more: the reply on its way may not know what has just happened.
+   */
+  refill() {
+    this.#isToAskAgain = true;
+    this.#asking ??= this.#askUntilFresh().finally(() => {
       this.#asking = null;
     });
     return this.#asking;
   }
 
-  async #ask(shown) {
+  async #askUntilFresh() {
+    while (this.#isToAskAgain) {
+      this.#isToAskAgain = false;
+      await this.#ask();
+    }
+  }
+
+  /** Compared when a reply is read, not when it was asked for: pairs are taken meanwhile. */
+  #isTaken(leaseId) {
+    return this.#isAnswered(leaseId) || this.#shown().includes(leaseId);
+  }
+
+  async #ask() {
     let reply;
     try {
       reply = await request('POST', `/api/v1/runs/${this.#run}/leases`, { count: N_LEASES });
@@ -96,7 +118,7 @@ export class ReadyPairs extends EventTarget {
     }
     for (const lease of reply.leases) {
       const isKnown = this.#entries.some((entry) => entry.lease.lease_id === lease.lease_id);
-      if (isKnown || lease.lease_id === shown || this.#isAnswered(lease.lease_id)) continue;
+      if (isKnown || this.#isTaken(lease.lease_id)) continue;
       this.#prepare({ lease, pair: null });
     }
     this.#tell('state', reply);
@@ -117,16 +139,13 @@ export class ReadyPairs extends EventTarget {
 
   async #heartbeat() {
     if (document.visibilityState !== 'visible') return;
-    for (const id of [this.shown, ...this.#entries.map((entry) => entry.lease.lease_id)]) {
-      if (!id) continue;
+    const held = [...this.#shown(), ...this.#entries.map((entry) => entry.lease.lease_id)];
+    for (const id of held.filter((leaseId) => !this.#isAnswered(leaseId))) {
       await request('POST', `/api/v1/leases/${id}/heartbeat`).catch(() => {
         // A lease that is gone is noticed when it is answered; the answer is kept aside, not lost.
       });
     }
   }
-
-  /** Lease on the page, kept alive with the others. @type {string | null} */
-  shown = null;
 
   #tell(type, detail) {
     this.dispatchEvent(new CustomEvent(type, { detail }));

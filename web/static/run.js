@@ -98,7 +98,9 @@ async function tellState() {
   const { kind, message, since, next } = now.state;
   page.dataset.state = kind;
   setText('state-message', message);
-  setText('state-since', since ? `since ${timeOfDay(since)}` : '');
+  const isUp = ['training', 'waiting_for_labels'].includes(kind);
+  page.toggleAttribute('data-no-questions', !isUp || now.labels >= now.budget);
+  setText('state-since', since ? `${kind === 'finished' ? 'at' : 'since'} ${timeOfDay(since)}` : '');
   setText('state-next', next ?? '');
   setText('labels-used', `${now.labels} of ${now.budget}`);
   $('labels-bar').max = now.budget;

@@ -51,6 +51,8 @@ pub struct Phase {
     pub step: u64,
     /// Environment steps in all.
     pub total_steps: u64,
+    /// Environment step at which the activity began: that of the session before, or 0.
+    pub from_step: u64,
     /// Environment step at which the activity ends, where it is known.
     pub until_step: Option<u64>,
     /// Answers received in the open session and answers it needs, while asking.
@@ -99,7 +101,8 @@ pub struct Metrics {
     pub entropy: Option<f64>,
     /// `InfoNCE` loss of the temporal distance.
     pub temporal_loss: Option<f64>,
-    /// Environment steps per second of wall time in the interval.
+    /// Environment steps per second of wall time in the interval, pauses and waiting for answers
+    /// left out.
     pub steps_per_s: f64,
 }
 

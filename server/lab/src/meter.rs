@@ -18,6 +18,8 @@ pub(crate) struct Meter {
     entropy: Mean,
     temporal_loss: Mean,
     last_row: Option<(u64, Instant)>,
+    /// Spent at rest since the last row.
+    rested: Duration,
     last_said: Option<Instant>,
 }
 
@@ -57,11 +59,20 @@ impl Meter {
         }
     }
 
+    /// Sleeps for about `time`, which counts as no time of practice.
+    pub(crate) fn rest(&mut self, time: Duration) {
+        let from = Instant::now();
+        std::thread::sleep(time);
+        self.rested += from.elapsed();
+    }
+
     /// The row for the interval that ends now; starts the next interval.
     pub(crate) fn row(&mut self, step: u64, labels: u32, replay: &Replay) -> Metrics {
         let now = Instant::now();
+        let rested = std::mem::take(&mut self.rested);
         let rate = |(from, since): (u64, Instant)| {
-            (step - from) as f64 / (now - since).as_secs_f64().max(1e-9)
+            let worked = (now - since).saturating_sub(rested);
+            (step - from) as f64 / worked.as_secs_f64().max(1e-9)
         };
         let steps_per_s = self.last_row.replace((step, now)).map_or(0.0, rate);
         let complete = replay.complete_episodes();

@@ -257,7 +257,7 @@ impl Run {
                 self.learn_from_session(events)?;
             } else if self.stands_still() {
                 self.say_activity(events);
-                std::thread::sleep(REST);
+                self.meter.rest(REST);
             } else if self.asks_now() {
                 self.ask(teacher, events)?;
             } else {
@@ -606,9 +606,13 @@ impl Run {
             return;
         }
         self.last_activity = Some(activity);
-        let next = self.config.feedback.step_of(self.progress.n_sessions);
+        let (feedback, n_sessions) = (&self.config.feedback, self.progress.n_sessions);
+        let from_step = n_sessions
+            .checked_sub(1)
+            .map_or(0, |last| feedback.step_of(last));
+        let next = feedback.step_of(n_sessions);
         let asks_again = self.method.sampler.is_some()
-            && self.preferences.n_preferred() < self.config.feedback.budget
+            && self.preferences.n_preferred() < feedback.budget
             && next < self.config.training.total_steps;
         let until = if asks_again {
             next
@@ -619,6 +623,7 @@ impl Run {
             activity,
             step: self.progress.step,
             total_steps: self.config.training.total_steps,
+            from_step,
             until_step: matches!(activity, Activity::Exploring | Activity::Learning)
                 .then_some(until),
             session_answers: self.session.as_ref().map(|s| s.progress(&self.preferences)),

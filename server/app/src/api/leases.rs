@@ -5,6 +5,7 @@ use axum::extract::{Path, State};
 use axum::http::StatusCode;
 use axum::response::{IntoResponse, Response};
 use domain::query::Question;
+use lab::message::{Activity, Phase};
 use serde::{Deserialize, Serialize};
 use store::{Lease, LeaseClip, NewAnswer, Progress, Queue, RunRow, Timing, now_ms, rfc3339};
 use utoipa::ToSchema;
@@ -82,7 +83,7 @@ pub struct QueueView {
 pub struct PhaseView {
     /// `exploring`, `asking`, `learning`, `evaluating`, `paused`.
     #[schema(value_type = String)]
-    activity: lab::message::Activity,
+    activity: Activity,
     /// Environment steps taken.
     step: u64,
     /// Environment steps in all.
@@ -312,6 +313,9 @@ fn queue_view(
     progress: Progress,
 ) -> QueueView {
     let phase = app.live.phase(run.id).map(|phase| phase_view(&phase));
+    let is_asking = phase
+        .as_ref()
+        .is_some_and(|phase| phase.activity == Activity::Asking);
     let view = |kind, message: &str, until| QueueView {
         kind,
         message: message.to_owned(),
@@ -324,14 +328,22 @@ fn queue_view(
         .map_or_else(|| run.state.message.clone(), |line| line.message);
     match run.state.kind.as_str() {
         "failed" => view("failed", &line, None),
-        "paused" => view("paused", "Paused by the researcher.", None),
+        "paused" => view(
+            "paused",
+            "The researcher lets this run stand still; your answers are kept.",
+            None,
+        ),
         "stopped" => view(
             "paused",
-            "Stopped by the researcher; it can be resumed.",
+            "The researcher has stopped this run; it can be resumed, and your answers are kept.",
             None,
         ),
         _ if has_leases => view("open", "Questions are waiting for you.", None),
-        "finished" => view("done", "The agent is trained. Thank you!", None),
+        "finished" => view(
+            "done",
+            "The agent is trained; the run's page shows what it can do.",
+            None,
+        ),
         _ if queue.n_drawing > 0 => match app.live.clip_trouble() {
             Some(trouble) => view(
                 "drawing",
@@ -346,26 +358,38 @@ fn queue_view(
         }
         _ if progress.answered >= progress.budget => view(
             "done",
-            "All questions of this run are answered. Thank you!",
+            "All questions are answered. The agent trains on for a while; see the run's page.",
             None,
         ),
-        _ if !run.is_trained => view("done", "All questions are answered. Thank you!", None),
+        _ if !run.is_trained => view("done", "All questions are answered.", None),
+        // Everything is answered and the run has not noticed yet.
+        _ if is_asking => view("waiting", "Your answers are being taken in.", None),
         _ => view("waiting", &line, None),
     }
 }
 
-fn phase_view(phase: &lab::message::Phase) -> PhaseView {
-    let progress = match (phase.until_step, phase.session_answers) {
-        (Some(until), _) if until > 0 => Some((phase.step as f64 / until as f64).min(1.0)),
-        (_, Some((got, needed))) if needed > 0 => Some(f64::from(got) / f64::from(needed)),
-        _ => None,
-    };
+fn phase_view(phase: &Phase) -> PhaseView {
     PhaseView {
         activity: phase.activity,
         step: phase.step,
         total_steps: phase.total_steps,
         until_step: phase.until_step,
-        progress,
+        progress: progress_of(phase),
+    }
+}
+
+/// How much of the way from the activity's first step, or first answer, to its last, 0 to 1.
+fn progress_of(phase: &Phase) -> Option<f64> {
+    match (phase.until_step, phase.session_answers) {
+        (Some(until), _) if until > phase.from_step => {
+            let (done, all) = (
+                phase.step.saturating_sub(phase.from_step),
+                until - phase.from_step,
+            );
+            Some((done as f64 / all as f64).min(1.0))
+        }
+        (_, Some((got, needed))) if needed > 0 => Some(f64::from(got) / f64::from(needed)),
+        _ => None,
     }
 }
 
@@ -376,5 +400,28 @@ fn progress_view(progress: Progress) -> ProgressView {
         session: progress.session,
         session_answered: progress.session_answered,
         session_size: progress.session_size,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_bar_of_a_wait_runs_from_its_first_step_to_its_last() {
+        let progress = |step| {
+            progress_of(&Phase {
+                activity: Activity::Learning,
+                step,
+                total_steps: 40_000,
+                from_step: 12_000,
+                until_step: Some(14_000),
+                session_answers: None,
+            })
+        };
+        assert_eq!(
+            [12_000, 13_000, 14_000, 14_008].map(progress),
+            [Some(0.0), Some(0.5), Some(1.0), Some(1.0)]
+        );
     }
 }

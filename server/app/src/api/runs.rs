@@ -11,6 +11,7 @@ use store::{NewRun, RunId, RunRow, rfc3339};
 use utoipa::ToSchema;
 
 use crate::extract::{Body, Run};
+use crate::live::HUMAN;
 use crate::problem::Problem;
 use crate::state::AppState;
 
@@ -79,8 +80,16 @@ pub struct StateView {
     pub message: String,
     /// Since when, RFC 3339.
     pub since: String,
-    /// What comes next.
+    /// What comes next; empty where nothing does.
     pub next: String,
+}
+
+impl RunView {
+    /// Whether a person can answer this run now.
+    pub fn can_label(&self) -> bool {
+        let is_up = matches!(self.state.kind.as_str(), "training" | "waiting_for_labels");
+        self.teacher == HUMAN && is_up && self.labels < self.budget
+    }
 }
 
 /// All runs, newest first.

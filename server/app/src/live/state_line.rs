@@ -43,7 +43,7 @@ pub struct StateLine {
     pub kind: StateKind,
     /// What it is doing.
     pub message: String,
-    /// What comes after.
+    /// What comes after; empty where nothing does.
     pub next: String,
 }
 
@@ -125,11 +125,7 @@ impl StateLine {
             thousands(finished.step),
             plural(labels, "answer", "answers")
         );
-        Self::of(
-            StateKind::Finished,
-            message,
-            "nothing: the agent is trained",
-        )
+        Self::of(StateKind::Finished, message, "")
     }
 
     /// A command ended it.
@@ -186,6 +182,7 @@ mod tests {
             activity,
             step: 12_400,
             total_steps: 40_000,
+            from_step: 0,
             until_step,
             session_answers,
         };

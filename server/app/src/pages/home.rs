@@ -29,9 +29,16 @@ struct HomePage {
     methods: Vec<Choice>,
     teachers: Vec<Choice>,
     presets: Vec<Choice>,
+    /// What is under way or can be taken up, and what is over; empty lists are left out.
+    groups: Vec<RunGroup>,
+    has_runs: bool,
+}
+
+/// Runs under one heading.
+struct RunGroup {
+    heading: &'static str,
     /// Newest first.
     runs: Vec<RunLine>,
-    has_runs: bool,
 }
 
 /// What a person wants to know before pressing Start.
@@ -67,8 +74,8 @@ struct RunLine {
     id: String,
     /// The task's title.
     title: String,
-    /// The method, as people read it.
-    method: String,
+    /// `STAIR, seed 1, begun 2026-05-02 14:02 UTC`: tells equal runs apart.
+    details: String,
     /// Kind of state, for colour.
     state: String,
     /// State in a few words.
@@ -84,15 +91,26 @@ struct RunLine {
 /// # Errors
 /// A store that cannot be read.
 pub async fn page(State(app): State<AppState>) -> Result<Response, Problem> {
-    let runs = run_lines(&app).await?;
+    let groups = groups(run_lines(&app).await?);
     Ok(show(&HomePage {
         tasks: sim::tasks::tasks().iter().map(card).collect(),
         methods: methods(),
         teachers: teachers(),
         presets: presets(),
-        has_runs: !runs.is_empty(),
-        runs,
+        has_runs: !groups.is_empty(),
+        groups,
     }))
+}
+
+/// Runs that go on before those that are finished.
+fn groups(runs: Vec<RunLine>) -> Vec<RunGroup> {
+    let (earlier, open): (Vec<_>, Vec<_>) =
+        runs.into_iter().partition(|run| run.state == "finished");
+    [("Go on with a run", open), ("Earlier runs", earlier)]
+        .into_iter()
+        .filter(|(_, runs)| !runs.is_empty())
+        .map(|(heading, runs)| RunGroup { heading, runs })
+        .collect()
 }
 
 /// What the form of a task sends; everything but the task may be left alone.
@@ -157,12 +175,17 @@ async fn run_lines(app: &AppState) -> Result<Vec<RunLine>, Problem> {
 }
 
 fn run_line(run: RunView) -> RunLine {
-    let is_up = matches!(run.state.kind.as_str(), "training" | "waiting_for_labels");
     RunLine {
         id: run.id.to_string(),
         title: title(&run.task).to_owned(),
-        method: method_name(&run.method),
-        can_label: run.teacher == HUMAN && is_up,
+        details: format!(
+            "{}, seed {}, begun {} {} UTC",
+            method_name(&run.method),
+            run.seed,
+            run.created_at.get(..10).unwrap_or_default(),
+            run.created_at.get(11..16).unwrap_or_default()
+        ),
+        can_label: run.can_label(),
         state: run.state.kind,
         message: run.state.message,
         labels: format!(
@@ -214,10 +237,21 @@ fn words_for(time: Duration) -> String {
 fn methods() -> Vec<Choice> {
     let choice = |method: &lab::method::MethodEntry| Choice {
         value: method.name,
-        words: format!("{}: {}", method_name(method.name), method.summary),
+        words: format!("{}: {}", method_name(method.name), choosing(method)),
         is_default: method.name == "stair",
     };
     lab::method::METHODS.iter().map(choice).collect()
+}
+
+/// How a method chooses its queries, short enough for a small phone.
+fn choosing(method: &lab::method::MethodEntry) -> &'static str {
+    match method.name {
+        "stair" => "within a stage",
+        "pebble" => "where unsure",
+        "uniform" => "at random",
+        "sac" => "none, sees the reward",
+        _ => method.summary,
+    }
 }
 
 /// `stair` → `STAIR`; methods are acronyms, all but one.
@@ -233,16 +267,13 @@ fn teachers() -> Vec<Choice> {
     let all = [
         (HUMAN, "People, on these pages"),
         ("oracle", "A script that never errs"),
-        ("mistaken", "A script that errs now and then"),
+        ("mistaken", "A script that may err"),
     ];
     choices(&all)
 }
 
 fn presets() -> Vec<Choice> {
-    choices(&[
-        ("quick", "Quick: for two cores and people"),
-        ("", "As in the paper"),
-    ])
+    choices(&[("quick", "Quick: for two cores"), ("", "As in the paper")])
 }
 
 /// The first is the default.
@@ -272,6 +303,23 @@ mod tests {
                 "about 3 hours"
             ]
         );
+    }
+
+    #[test]
+    fn a_finished_run_is_no_run_to_go_on_with() {
+        let run = |state: &str| RunLine {
+            id: String::new(),
+            title: String::new(),
+            details: String::new(),
+            state: state.to_owned(),
+            message: String::new(),
+            labels: String::new(),
+            can_label: false,
+        };
+        let found = groups(vec![run("finished"), run("stopped"), run("finished")]);
+        let found: Vec<_> = found.iter().map(|g| (g.heading, g.runs.len())).collect();
+        assert_eq!(found, [("Go on with a run", 1), ("Earlier runs", 2)]);
+        assert!(groups(vec![]).is_empty());
     }
 
     #[test]

@@ -23,6 +23,8 @@ struct LabelPage {
     task_title: &'static str,
     /// What the agent should learn, one sentence.
     aim: &'static str,
+    /// What there is to tell apart when both clips are at a stage.
+    stages: String,
     /// HTML.
     guidance: String,
     /// Sent along with every answer.
@@ -86,6 +88,7 @@ fn filled_in(run: &RunRow) -> LabelPage {
         run: run.id.to_string(),
         task_title: title(&run.task),
         aim: task.map_or("", |task| task.summary),
+        stages: task.map_or_else(String::new, stages_in_words),
         guidance: guidance.html,
         guidance_sha256: guidance.sha256,
         answers: format!(
@@ -95,5 +98,31 @@ fn filled_in(run: &RunRow) -> LabelPage {
         ),
         labels: run.n_labels,
         budget: run.budget,
+    }
+}
+
+/// The stages by name where the task knows them; its aim otherwise.
+fn stages_in_words(task: &sim::tasks::Task) -> String {
+    let stages = (task.spec)().stages;
+    if stages.is_empty() {
+        task.summary.to_owned()
+    } else {
+        format!("The stages are {}.", stages.join(", then "))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stages_are_named_where_the_task_knows_them() {
+        let words = |name| stages_in_words(sim::tasks::task(name).expect("a task"));
+        assert_eq!(
+            words("go-fetch-return"),
+            "The stages are go, then fetch, then return."
+        );
+        let aim = sim::tasks::task("window-open").expect("a task").summary;
+        assert_eq!(words("window-open"), aim);
     }
 }

@@ -36,8 +36,10 @@ struct RunPage {
     state: String,
     /// What it is doing.
     message: String,
-    /// `since 14:02:11`
+    /// `since 14:02:11`; `at 14:02:11` where the run is over.
     since: String,
+    /// Whether a person can answer it now.
+    can_label: bool,
     /// What comes next.
     next: String,
     /// Environment steps, now and in all.
@@ -105,50 +107,50 @@ const CURVES: &[Curve] = &[
     Curve {
         id: "success",
         title: "Success",
-        says: "Share of held-out episodes that reach the goal.",
-        before: "After the first trial.",
+        says: "Share of trial episodes that reach the goal.",
+        before: "Drawn after the first trial.",
     },
     Curve {
         id: "return",
         title: "Task reward",
-        says: "Sum over an episode. Solid: trials. Dashed: while training.",
-        before: "After the first episodes.",
+        says: "Points that the task itself gives in an episode. Solid: trials. Dashed: practice.",
+        before: "Drawn after the first episodes.",
     },
     Curve {
         id: "accuracy",
         title: "Reward model",
-        says: "How often it agrees with the answers.",
-        before: "After the first round of answers.",
+        says: "How often it prefers the clip that the answers prefer.",
+        before: "Drawn after the first round of answers.",
     },
     Curve {
         id: "correlation",
         title: "Learned and task reward",
-        says: "Correlation over the steps of held-out episodes.",
-        before: "After the first round of answers.",
+        says: "How closely the two rise and fall together; at best 1.",
+        before: "Drawn after the first round of answers.",
     },
     Curve {
         id: "gap",
         title: "Stage gap",
-        says: "Smaller is better aligned, nats. Solid: pairs asked. Dashed: all candidates.",
-        before: "Where pairs are chosen by stage, from the second round.",
+        says: "How far the two clips of a pair are apart in the task. Solid: pairs asked. Dashed: all pairs to choose from.",
+        before: "Drawn from the second round, where pairs are chosen by stage.",
     },
     Curve {
         id: "disagreement",
         title: "Disagreement",
-        says: "Of the reward models. Solid: pairs asked. Dashed: all candidates.",
-        before: "From the second round.",
+        says: "How unsure the reward model is about a pair. Solid: pairs asked. Dashed: all pairs to choose from.",
+        before: "Drawn from the second round.",
     },
     Curve {
         id: "labels",
         title: "Answers",
-        says: "That the reward is learned from.",
-        before: "After the first round of answers.",
+        says: "How many answers the reward model has learned from.",
+        before: "Drawn after the first round of answers.",
     },
     Curve {
         id: "speed",
         title: "Speed",
-        says: "Steps of practice a second.",
-        before: "In a moment.",
+        says: "Steps of practice in a second, waiting for answers left out.",
+        before: "Drawn in a moment.",
     },
 ];
 
@@ -169,7 +171,16 @@ pub async fn page(State(app): State<AppState>, Run(row): Run) -> Result<Response
         task_title: title(&run.task),
         method_words: method_words(&run),
         is_for_people: run.teacher == HUMAN,
-        since: format!("since {}", time_of_day(&run.state.since)),
+        since: format!(
+            "{} {}",
+            if run.state.kind == "finished" {
+                "at"
+            } else {
+                "since"
+            },
+            time_of_day(&run.state.since)
+        ),
+        can_label: run.can_label(),
         step: run.step,
         total_steps: run.total_steps,
         steps_done: thousands(run.step),
@@ -285,14 +296,14 @@ async fn broken(app: &AppState, run: RunId) -> Result<Vec<String>, Problem> {
 
 fn shown(when: &str, row: &DemonstrationRow) -> Shown {
     let outcome = if row.shows.success {
-        "success"
+        "it reaches the goal"
     } else {
-        "no success"
+        "it does not reach the goal"
     };
     Shown {
         clip: address(&row.clip),
         caption: format!(
-            "{when}, after {} steps: {outcome}",
+            "{when}, after {} steps, {outcome}",
             thousands(row.shows.step)
         ),
     }
