@@ -5,6 +5,7 @@
 
 pub mod config;
 pub mod evaluate;
+pub mod memory;
 pub mod message;
 pub mod method;
 pub mod nearest;
