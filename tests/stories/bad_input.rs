@@ -133,6 +133,48 @@ fn a_policy_or_a_run_that_is_none_is_named() {
 }
 
 #[test]
+fn a_policy_of_another_task_a_missing_device_and_too_little_memory_are_named() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let here = folder.path();
+    let few_steps = [
+        "train",
+        "go-fetch-return",
+        "--preset",
+        "quick",
+        "--steps",
+        "50",
+        "--set",
+        "evaluation.episodes=1",
+        "--out",
+        "trained",
+        "--json",
+    ];
+    let mut command: Command = stair();
+    let output = command.args(few_steps).current_dir(here).output();
+    assert!(output.expect("stair").status.success());
+    expect(
+        &["evaluate", "window-open", "--policy", "trained"],
+        here,
+        &["go-fetch-return", "window-open"],
+    );
+    expect(
+        &["train", "--resume", "trained", "--device", "tpu"],
+        here,
+        &["tpu", "cuda"],
+    );
+    expect(
+        &["train", "go-fetch-return", "--device", "tpu"],
+        here,
+        &["tpu", "cuda"],
+    );
+    expect(
+        &["train", "go-fetch-return", "--steps", "1000000000000"],
+        here,
+        &["training.total_steps", "GiB"],
+    );
+}
+
+#[test]
 fn a_port_in_use_and_a_folder_in_use_are_named() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let here = folder.path();

@@ -479,6 +479,26 @@ impl RunConfig {
         }
     }
 
+    /// The first setting in which two trees differ that decides what a checkpoint holds, with
+    /// its value here and there.
+    pub(crate) fn first_misfit(&self, other: &Self) -> Option<(&'static str, String, String)> {
+        type Describe = fn(&RunConfig) -> String;
+        let deciding: [(&str, Describe); 8] = [
+            ("task", |c| c.task.clone()),
+            ("environment.n_envs", |c| c.environment.n_envs.to_string()),
+            ("agent.hidden", |c| format!("{:?}", c.agent.hidden)),
+            ("agent.layer_norm", |c| c.agent.layer_norm.to_string()),
+            ("reward.members", |c| c.reward.members.to_string()),
+            ("reward.hidden", |c| format!("{:?}", c.reward.hidden)),
+            ("temporal.hidden", |c| format!("{:?}", c.temporal.hidden)),
+            ("temporal.latent", |c| c.temporal.latent.to_string()),
+        ];
+        deciding.into_iter().find_map(|(key, of)| {
+            let (own, others) = (of(self), of(other));
+            (own != others).then_some((key, own, others))
+        })
+    }
+
     fn check(&self) -> Result<(), ConfigError> {
         let task = find_task(&self.task)?;
         method::find(&self.method)?;
@@ -555,6 +575,53 @@ impl RunConfig {
                 "queries.segment_len",
                 q.segment_len.to_string(),
                 "at most an episode's length",
+            );
+        }
+        self.check_sizes()
+    }
+
+    /// Of networks and of what they are given at once.
+    fn check_sizes(&self) -> Result<(), ConfigError> {
+        let out = |key, value: String, must_be| {
+            Err(ConfigError::OutOfRange {
+                key,
+                value,
+                must_be,
+            })
+        };
+        let sizes = [
+            ("agent.hidden", &self.agent.hidden),
+            ("reward.hidden", &self.reward.hidden),
+            ("temporal.hidden", &self.temporal.hidden),
+        ];
+        for (key, sizes) in sizes {
+            if sizes.len() > 16 || sizes.iter().any(|n| !(1..=65_536).contains(n)) {
+                let must_be = "at most 16 layers of 1 to 65536";
+                return out(key, format!("{sizes:?}"), must_be);
+            }
+        }
+        let batches = [
+            ("agent.batch", self.agent.batch),
+            ("reward.batch", self.reward.batch),
+            ("temporal.batch", self.temporal.batch),
+        ];
+        for (key, batch) in batches {
+            if !(1..=1_000_000).contains(&batch) {
+                return out(key, batch.to_string(), "from 1 to 1000000");
+            }
+        }
+        if !(1..=64).contains(&self.reward.members) {
+            return out(
+                "reward.members",
+                self.reward.members.to_string(),
+                "from 1 to 64",
+            );
+        }
+        if !(1..=65_536).contains(&self.temporal.latent) {
+            return out(
+                "temporal.latent",
+                self.temporal.latent.to_string(),
+                "from 1 to 65536",
             );
         }
         Ok(())
@@ -743,6 +810,11 @@ mod tests {
             "seed=many",
             "seed",
             "feedback.every=0",
+            "agent.hidden=[256, 0]",
+            "agent.hidden=[1000000000]",
+            "agent.batch=0",
+            "agent.precision=f16",
+            "reward.members=0",
         ] {
             RunConfig::resolve(&layers(&[], &[bad])).unwrap_err();
         }

@@ -13,7 +13,7 @@ use learn::LearnError;
 use learn::beliefs::LearnedBeliefs;
 use learn::checkpoint::Archive;
 use learn::device::Device;
-use learn::replay::{Replay, ReplayMark, ReplayShape};
+use learn::replay::{Replay, ReplayMark};
 use serde::{Deserialize, Serialize};
 
 use crate::candidates;
@@ -22,6 +22,7 @@ use crate::evaluate::{Trial, correlation, evaluate};
 use crate::folder::RunFolder;
 use crate::lanes::{Lanes, LanesState};
 use crate::learner::{Due, Learner};
+use crate::memory::{self, MemoryNeed, TooLittleMemory, shape};
 use crate::message::{
     Activity, Checkpointed, Command, Demonstration, Evaluation, Event, Finished, Phase,
     SessionClosed,
@@ -89,6 +90,23 @@ pub enum RunError {
     /// A teacher that cannot be asked.
     #[error("the teacher cannot go on: {0}")]
     Teacher(#[from] TeacherError),
+    /// A run that this machine cannot hold.
+    #[error(transparent)]
+    Memory(#[from] TooLittleMemory),
+    /// A checkpoint and the folder's settings that do not belong together.
+    #[error(
+        "{path} was written with {key} = {checkpoint}, but config.toml beside it says {settings}; put {checkpoint} back there to go on with it, or start a new run elsewhere", path = path.display()
+    )]
+    OtherSettings {
+        /// The checkpoint.
+        path: PathBuf,
+        /// Dotted path of the setting.
+        key: &'static str,
+        /// Its value in the checkpoint.
+        checkpoint: String,
+        /// Its value in the folder.
+        settings: String,
+    },
     /// The disk.
     #[error("cannot {doing} ({path}): {source}")]
     Io {
@@ -124,7 +142,11 @@ impl Run {
         let task = find_task(&config.task)?;
         let spec = (task.spec)();
         let method = (method::find(&config.method)?.build)(&config);
-        let learner = Learner::new(&config, &spec, &method, Device::open(&config.device)?);
+        let device = Device::open(&config.device)?;
+        if let Some(bytes) = memory::available() {
+            MemoryNeed::of(&config, &spec, &method).check(&spec, bytes)?;
+        }
+        let learner = Learner::new(&config, &spec, &method, device);
         let mut replay = Replay::new(shape(&spec), config.environment.n_envs);
         let lanes = Lanes::start(task, config.environment.n_envs, config.seed, &mut replay);
         let folder = RunFolder::create(folder)?;
@@ -160,8 +182,20 @@ impl Run {
     /// # Errors
     /// [`RunError`]; nothing is changed.
     pub fn resume(folder: &Path) -> Result<(Self, Vec<String>), RunError> {
+        Self::resume_on(folder, None)
+    }
+
+    /// The same on another device than the settings name; a checkpoint fits any.
+    ///
+    /// # Errors
+    /// [`RunError`]; nothing is changed.
+    pub fn resume_on(folder: &Path, device: Option<&str>) -> Result<(Self, Vec<String>), RunError> {
         let (run_folder, text) = RunFolder::open(folder)?;
-        let config = RunConfig::parse("config.toml", &text)?;
+        let mut config = RunConfig::parse("config.toml", &text)?;
+        if let Some(device) = device {
+            device.clone_into(&mut config.device);
+        }
+        Device::open(&config.device)?; // before a checkpoint could be blamed for it
         let mut complaints = Vec::new();
         let steps = run_folder.checkpoints()?;
         let mut run_folder = Some(run_folder);
@@ -172,6 +206,7 @@ impl Run {
             };
             match Self::restore(config.clone(), opened, step) {
                 Ok(run) => return Ok((run, complaints)),
+                Err(error @ RunError::OtherSettings { .. }) => return Err(error),
                 Err(error) => complaints.push(format!("checkpoint of step {step}: {error}")),
             }
         }
@@ -187,7 +222,18 @@ impl Run {
     }
 
     fn restore(config: RunConfig, mut folder: RunFolder, step: u64) -> Result<Self, RunError> {
-        let archive = Archive::read(&folder.checkpoint_path(step))?;
+        let path = folder.checkpoint_path(step);
+        let archive = Archive::read(&path)?;
+        let written = archive.json::<String>("config")?;
+        let written = RunConfig::parse("the checkpoint's settings", &written)?;
+        if let Some((key, checkpoint, settings)) = written.first_misfit(&config) {
+            return Err(RunError::OtherSettings {
+                path,
+                key,
+                checkpoint,
+                settings,
+            });
+        }
         let task = find_task(&config.task)?;
         let spec = (task.spec)();
         let method = (method::find(&config.method)?.build)(&config);
@@ -628,13 +674,5 @@ impl Run {
                 .then_some(until),
             session_answers: self.session.as_ref().map(|s| s.progress(&self.preferences)),
         }));
-    }
-}
-
-fn shape(spec: &EnvSpec) -> ReplayShape {
-    ReplayShape {
-        observation: spec.observation_size,
-        action: spec.action_size,
-        pose: spec.pose_size,
     }
 }

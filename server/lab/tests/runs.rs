@@ -247,6 +247,63 @@ fn a_second_run_is_not_started_in_the_folder_of_the_first() {
     assert!(error.to_string().contains("holds a run already"), "{error}");
 }
 
+#[test]
+fn a_run_that_cannot_fit_into_memory_is_refused_before_anything_is_written() {
+    let folder = Folder::new("too-long");
+    let mut config = short();
+    config.training.total_steps = u64::MAX;
+    let Err(error) = Run::start(config, &folder.0) else {
+        panic!("it started")
+    };
+    let text = error.to_string();
+    assert!(text.contains("training.total_steps"), "{text}");
+    assert!(!folder.0.exists());
+}
+
+fn edit_settings(folder: &Folder, from: &str, to: &str) {
+    let path = folder.0.join("config.toml");
+    let text = std::fs::read_to_string(&path).unwrap();
+    assert!(text.contains(from), "{text}");
+    std::fs::write(&path, text.replacen(from, to, 1)).unwrap();
+}
+
+#[test]
+fn a_checkpoint_of_other_settings_is_refused_and_kept() {
+    let folder = Folder::new("misfit");
+    drop(Run::start(short(), &folder.0).unwrap());
+    for (from, to, words) in [
+        (
+            "task = \"go-fetch-return\"",
+            "task = \"window-open\"",
+            ["task", "go-fetch-return", "window-open"],
+        ),
+        (
+            "hidden = [16, 16]",
+            "hidden = [32, 16]",
+            ["agent.hidden", "[16, 16]", "[32, 16]"],
+        ),
+        ("n_envs = 2", "n_envs = 3", ["environment.n_envs", "2", "3"]),
+        (
+            "device = \"cpu\"",
+            "device = \"tpu\"",
+            ["no device", "tpu", "cpu"],
+        ),
+    ] {
+        edit_settings(&folder, from, to);
+        let Err(error) = Run::resume(&folder.0) else {
+            panic!("{to} goes unnoticed")
+        };
+        let text = error.to_string();
+        for word in words {
+            assert!(text.contains(word), "'{word}' is not in: {text}");
+        }
+        edit_settings(&folder, to, from);
+    }
+    edit_settings(&folder, "device = \"cpu\"", "device = \"cuda:77\"");
+    let (run, complaints) = Run::resume_on(&folder.0, Some("cpu")).unwrap();
+    assert_eq!((run.config().device.as_str(), complaints), ("cpu", vec![]));
+}
+
 /// The small task from some ninety answers: the oracle's teach it, a coin's do not.
 #[test]
 fn answers_teach_the_task_and_a_coin_does_not() {

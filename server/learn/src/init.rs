@@ -65,6 +65,7 @@ mod tests {
             sizes: vec![5, 16, 3],
             slope: 0.0,
             layer_norm: false,
+            precision: crate::Precision::F32,
         };
         let flat = Tensor::ones([shape.n_values()], (Kind::Double, Device::Cpu));
         let mut net = Net::over(&shape, &flat, 0);

@@ -2,61 +2,42 @@
 //!
 //! Each function has two roads that agree to rounding: plain loops for tensors of the processor
 //! (which the compiler turns into vector instructions), tensor operations for other devices.
-//! Shapes: `E` members, `B` rows, `N` columns; all tensors contiguous.
-
-use std::ops::{Add, AddAssign, Div, Mul, MulAssign, Sub, SubAssign};
+//! Shapes: `E` members, `B` rows, `N` columns; all tensors contiguous. Activations and their
+//! gradients may be bf16; biases, sums and everything in between are then f32.
 
 use tch::{Device, Kind, Tensor};
+
+mod number;
+
+use number::Bf16;
+pub(crate) use number::{Real, Stored};
 
 /// LayerNorm's ε, as PyTorch's.
 pub(crate) const NORM_EPSILON: f64 = 1e-5;
 
-/// f32, or f64 where a test wants more digits.
-pub(crate) trait Real:
-    tch::kind::Element
-    + Copy
-    + PartialOrd
-    + AddAssign
-    + SubAssign
-    + MulAssign
-    + Add<Output = Self>
-    + Sub<Output = Self>
-    + Mul<Output = Self>
-    + Div<Output = Self>
-{
-    fn of(value: f64) -> Self;
-    fn sqrt(self) -> Self;
-    /// A whole number from 0 on as an index; `None` below.
-    fn index(self) -> Option<usize>;
-}
-
-impl Real for f32 {
-    fn of(value: f64) -> Self {
-        value as f32
-    }
-    fn sqrt(self) -> Self {
-        f32::sqrt(self)
-    }
-    fn index(self) -> Option<usize> {
-        (self >= 0.0).then_some(self as usize)
-    }
-}
-
-impl Real for f64 {
-    fn of(value: f64) -> Self {
-        value
-    }
-    fn sqrt(self) -> Self {
-        f64::sqrt(self)
-    }
-    fn index(self) -> Option<usize> {
-        (self >= 0.0).then_some(self as usize)
-    }
-}
-
-/// Runs the first block with `$T` as the tensor's number type where plain loops can reach it,
-/// else the second.
+/// Runs the first block where plain loops can reach the tensor, else the second. `$T` is then
+/// the type of its numbers, `$R` what they are computed with; without `$R`, they are the same.
 macro_rules! on_slices {
+    ($tensor:expr, $T:ident of $R:ident => $slices:expr, $tensors:expr) => {
+        match ($tensor.device(), $tensor.kind()) {
+            (Device::Cpu, Kind::BFloat16) => {
+                type $T = Bf16;
+                type $R = f32;
+                $slices
+            }
+            (Device::Cpu, Kind::Float) => {
+                type $T = f32;
+                type $R = f32;
+                $slices
+            }
+            (Device::Cpu, Kind::Double) => {
+                type $T = f64;
+                type $R = f64;
+                $slices
+            }
+            _ => $tensors,
+        }
+    };
     ($tensor:expr, $T:ident => $slices:expr, $tensors:expr) => {
         match ($tensor.device(), $tensor.kind()) {
             (Device::Cpu, Kind::Float) => {
@@ -77,14 +58,14 @@ macro_rules! on_slices {
 pub(crate) fn bias_activate(z: &mut Tensor, bias: &Tensor, slope: f64) {
     on_slices!(
         z,
-        T => {
+        T of R => {
             let (n_columns, member) = (columns(z), member_len(z));
-            let slope = T::of(slope);
-            for (z, bias) in values_mut::<T>(z).chunks_exact_mut(member).zip(values::<T>(bias).chunks_exact(n_columns)) {
+            let slope = R::of(slope);
+            let members = values_mut::<T>(z).chunks_exact_mut(member);
+            for (z, bias) in members.zip(values::<R>(bias).chunks_exact(n_columns)) {
                 for row in z.chunks_exact_mut(n_columns) {
                     for (z, b) in row.iter_mut().zip(bias) {
-                        let sum = *z + *b;
-                        *z = if sum > T::of(0.0) { sum } else { slope * sum };
+                        *z = T::store(activated(z.load() + *b, slope));
                     }
                 }
             }
@@ -106,14 +87,14 @@ pub(crate) fn bias_activate_backward(
 ) {
     on_slices!(
         gradient,
-        T => {
+        T of R => {
             let (n_columns, member) = (columns(gradient), member_len(gradient));
-            let slope = T::of(slope);
+            let slope = R::of(slope);
             let mut unused = Vec::new();
             let sums = if let Some(sums) = bias_gradient {
-                values_mut::<T>(sums)
+                values_mut::<R>(sums)
             } else {
-                unused.resize(gradient.numel() / member * n_columns, T::of(0.0));
+                unused.resize(gradient.numel() / member * n_columns, R::of(0.0));
                 &mut unused[..]
             };
             let members = values_mut::<T>(gradient).chunks_exact_mut(member);
@@ -122,8 +103,9 @@ pub(crate) fn bias_activate_backward(
                 let rows = gradient.chunks_exact_mut(n_columns).zip(output.chunks_exact(n_columns));
                 for (gradient, output) in rows {
                     for ((g, y), sum) in gradient.iter_mut().zip(output).zip(&mut *sums) {
-                        *g = if *y > T::of(0.0) { *g } else { slope * *g };
-                        *sum += *g;
+                        let masked = passed(g.load(), y.load(), slope);
+                        *g = T::store(masked);
+                        *sum += masked;
                     }
                 }
             }
@@ -132,7 +114,8 @@ pub(crate) fn bias_activate_backward(
             let scaled = &*gradient * slope;
             gradient.copy_(&gradient.where_self(&output.gt(0.0), &scaled));
             if let Some(sums) = bias_gradient {
-                let _ = sums.g_add_(&gradient.sum_dim_intlist([1_i64].as_slice(), true, None));
+                let own = gradient.sum_dim_intlist([1_i64].as_slice(), true, sums.kind());
+                let _ = sums.g_add_(&own);
             }
         }
     );
@@ -149,32 +132,33 @@ pub(crate) fn norm_activate(
     let (gain, shift) = norm;
     on_slices!(
         z,
-        T => {
+        T of R => {
             let (n_columns, member) = (columns(z), member_len(z));
-            let (slope, n) = (T::of(slope), T::of(n_columns as f64));
+            let (slope, n) = (R::of(slope), R::of(n_columns as f64));
             let mut output = z.empty_like();
             let size = z.size();
-            let mut inverse = Tensor::empty([size[0], size[1], 1], (z.kind(), z.device()));
-            let (out, inv) = (values_mut::<T>(&mut output), values_mut::<T>(&mut inverse));
-            let (bias, gain, shift) = (values::<T>(bias), values::<T>(gain), values::<T>(shift));
+            let mut inverse = Tensor::empty([size[0], size[1], 1], (R::KIND, z.device()));
+            let (out, inv) = (values_mut::<T>(&mut output), values_mut::<R>(&mut inverse));
+            let (bias, gain, shift) = (values::<R>(bias), values::<R>(gain), values::<R>(shift));
+            let mut centred = vec![R::of(0.0); n_columns];
             let rows = values_mut::<T>(z).chunks_exact_mut(n_columns).zip(out.chunks_exact_mut(n_columns));
             for (index, ((z, y), inverse)) in rows.zip(inv).enumerate() {
                 let at = index * n_columns / member * n_columns;
                 let (bias, gain, shift) =
                     (&bias[at..at + n_columns], &gain[at..at + n_columns], &shift[at..at + n_columns]);
-                for (z, b) in z.iter_mut().zip(bias) {
-                    *z += *b;
+                for ((x, z), b) in centred.iter_mut().zip(&*z).zip(bias) {
+                    *x = z.load() + *b;
                 }
-                let mean = sum(z) / n;
-                for z in &mut *z {
-                    *z -= mean;
+                let mean = sum(&centred) / n;
+                for x in &mut centred {
+                    *x -= mean;
                 }
-                let variance = dot(z, z) / n;
-                *inverse = T::of(1.0) / (variance + T::of(NORM_EPSILON)).sqrt();
-                for (((z, y), g), s) in z.iter_mut().zip(y).zip(gain).zip(shift) {
-                    *z *= *inverse;
-                    let value = *z * *g + *s;
-                    *y = if value > T::of(0.0) { value } else { slope * value };
+                let variance = dot(&centred, &centred) / n;
+                *inverse = R::of(1.0) / (variance + R::of(NORM_EPSILON)).sqrt();
+                for ((((x, z), y), g), s) in centred.iter().zip(z).zip(y).zip(gain).zip(shift) {
+                    let normalised = *x * *inverse;
+                    *z = T::store(normalised);
+                    *y = T::store(activated(normalised * *g + *s, slope));
                 }
             }
             (output, inverse)
@@ -188,7 +172,7 @@ pub(crate) fn norm_activate(
             z.copy_(&(centred * &inverse));
             let value = &*z * gain + shift;
             let output = value.where_self(&value.gt(0.0), &(&value * slope));
-            (output, inverse)
+            (output.to_kind(z.kind()), inverse)
         }
     )
 }
@@ -221,38 +205,40 @@ pub(crate) fn norm_activate_backward(
 ) {
     on_slices!(
         gradient,
-        T => {
+        T of R => {
             let (n_columns, member) = (columns(gradient), member_len(gradient));
-            let (slope, n) = (T::of(slope), T::of(n_columns as f64));
+            let (slope, n) = (R::of(slope), R::of(n_columns as f64));
             let mut unused = Vec::new();
             let (bias, gains, shifts) = if let Some(NormGradient { bias, gain, shift }) = into {
-                (values_mut::<T>(bias), values_mut::<T>(gain), values_mut::<T>(shift))
+                (values_mut::<R>(bias), values_mut::<R>(gain), values_mut::<R>(shift))
             } else {
                 let len = gradient.numel() / member * n_columns;
-                unused.resize(3 * len, T::of(0.0));
+                unused.resize(3 * len, R::of(0.0));
                 let (bias, rest) = unused.split_at_mut(len);
                 let (gains, shifts) = rest.split_at_mut(len);
                 (bias, gains, shifts)
             };
             let (outputs, normalised) = (values::<T>(forward.output), values::<T>(forward.normalised));
-            let (inverses, gain) = (values::<T>(forward.inverse), values::<T>(forward.gain));
+            let (inverses, gain) = (values::<R>(forward.inverse), values::<R>(forward.gain));
+            let mut scaled = vec![R::of(0.0); n_columns];
             for (index, d) in values_mut::<T>(gradient).chunks_exact_mut(n_columns).enumerate() {
                 let at = index * n_columns / member * n_columns;
                 let (row, own) = (index * n_columns..(index + 1) * n_columns, at..at + n_columns);
                 let (y, x, inverse) = (&outputs[row.clone()], &normalised[row], inverses[index]);
                 let (gain, gains) = (&gain[own.clone()], &mut gains[own.clone()]);
                 let (shifts, bias) = (&mut shifts[own.clone()], &mut bias[own]);
-                let parts = d.iter_mut().zip(y).zip(x).zip(gain).zip(gains).zip(shifts);
-                for (((((d, y), x), gain), gains), shifts) in parts {
-                    let g = if *y > T::of(0.0) { *d } else { slope * *d };
+                let parts = scaled.iter_mut().zip(&*d).zip(y).zip(x).zip(gain).zip(gains).zip(shifts);
+                for ((((((scaled, d), y), x), gain), gains), shifts) in parts {
+                    let g = passed(d.load(), y.load(), slope);
                     *shifts += g;
-                    *gains += g * *x;
-                    *d = g * *gain;
+                    *gains += g * x.load();
+                    *scaled = g * *gain;
                 }
-                let (mean, along) = (sum(d) / n, dot(d, x) / n);
-                for ((d, x), bias) in d.iter_mut().zip(x).zip(bias) {
-                    *d = inverse * (*d - mean - *x * along);
-                    *bias += *d;
+                let (mean, along) = (sum(&scaled) / n, dot(&scaled, x) / n);
+                for (((d, scaled), x), bias) in d.iter_mut().zip(&scaled).zip(x).zip(bias) {
+                    let own = inverse * (*scaled - mean - x.load() * along);
+                    *d = T::store(own);
+                    *bias += own;
                 }
             }
         },
@@ -265,9 +251,10 @@ pub(crate) fn norm_activate_backward(
             let along = (&d * forward.normalised).mean_dim([-1_i64].as_slice(), true, None);
             gradient.copy_(&((d - mean - forward.normalised * along) * forward.inverse));
             if let Some(NormGradient { bias, gain, shift }) = into {
-                let _ = shift.g_add_(&g.sum_dim_intlist(rows.as_slice(), true, None));
-                let _ = gain.g_add_(&(&g * forward.normalised).sum_dim_intlist(rows.as_slice(), true, None));
-                let _ = bias.g_add_(&gradient.sum_dim_intlist(rows.as_slice(), true, None));
+                let sum = |of: &Tensor, kind| of.sum_dim_intlist(rows.as_slice(), true, kind);
+                let _ = shift.g_add_(&sum(&g, shift.kind()));
+                let _ = gain.g_add_(&sum(&(&g * forward.normalised), gain.kind()));
+                let _ = bias.g_add_(&sum(gradient, bias.kind()));
             }
         }
     );
@@ -338,6 +325,24 @@ pub(crate) fn lerp(target: &mut Tensor, source: &Tensor, weight: f64) {
     );
 }
 
+/// The activation.
+fn activated<R: Real>(value: R, slope: R) -> R {
+    if value > R::of(0.0) {
+        value
+    } else {
+        slope * value
+    }
+}
+
+/// What of an output's gradient reaches the activation's input.
+fn passed<R: Real>(gradient: R, output: R, slope: R) -> R {
+    if output > R::of(0.0) {
+        gradient
+    } else {
+        slope * gradient
+    }
+}
+
 /// Sum in 16 strands, so that it vectorises and always rounds alike.
 fn sum<T: Real>(values: &[T]) -> T {
     let (mut strands, chunks) = ([T::of(0.0); 16], values.chunks_exact(16));
@@ -354,18 +359,18 @@ fn sum<T: Real>(values: &[T]) -> T {
 }
 
 /// Inner product in 16 strands.
-fn dot<T: Real>(a: &[T], b: &[T]) -> T {
-    let (mut strands, chunks) = ([T::of(0.0); 16], a.chunks_exact(16).zip(b.chunks_exact(16)));
+fn dot<R: Real, T: Stored<Real = R>>(a: &[R], b: &[T]) -> R {
+    let (mut strands, chunks) = ([R::of(0.0); 16], a.chunks_exact(16).zip(b.chunks_exact(16)));
     for (a, b) in chunks {
         for (strand, (a, b)) in strands.iter_mut().zip(a.iter().zip(b)) {
-            *strand += *a * *b;
+            *strand += *a * b.load();
         }
     }
     let done = a.len() / 16 * 16;
     let rest = a[done..]
         .iter()
         .zip(&b[done..])
-        .fold(T::of(0.0), |total, (a, b)| total + *a * *b);
+        .fold(R::of(0.0), |total, (a, b)| total + *a * b.load());
     strands.iter().fold(rest, |total, value| total + *value)
 }
 
@@ -380,7 +385,7 @@ fn member_len(tensor: &Tensor) -> usize {
 
 /// A tensor's numbers in place. Panics unless they are `T`s, on the processor and contiguous.
 #[expect(unsafe_code, reason = "libtorch hands out its memory as a pointer")]
-pub(crate) fn values<T: Real>(tensor: &Tensor) -> &[T] {
+pub(crate) fn values<T: Stored>(tensor: &Tensor) -> &[T] {
     check::<T>(tensor);
     if tensor.numel() == 0 {
         return &[];
@@ -393,7 +398,7 @@ pub(crate) fn values<T: Real>(tensor: &Tensor) -> &[T] {
 
 /// The same to be written.
 #[expect(unsafe_code, reason = "libtorch hands out its memory as a pointer")]
-pub(crate) fn values_mut<T: Real>(tensor: &mut Tensor) -> &mut [T] {
+pub(crate) fn values_mut<T: Stored>(tensor: &mut Tensor) -> &mut [T] {
     check::<T>(tensor);
     if tensor.numel() == 0 {
         return &mut [];
@@ -402,7 +407,7 @@ pub(crate) fn values_mut<T: Real>(tensor: &mut Tensor) -> &mut [T] {
     unsafe { std::slice::from_raw_parts_mut(tensor.data_ptr().cast::<T>(), tensor.numel()) }
 }
 
-fn check<T: Real>(tensor: &Tensor) {
+fn check<T: Stored>(tensor: &Tensor) {
     assert!(
         tensor.kind() == T::KIND && tensor.device() == Device::Cpu && tensor.is_contiguous(),
         "kernels take contiguous tensors of the processor"

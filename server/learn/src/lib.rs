@@ -25,5 +25,7 @@ mod error;
 mod init;
 mod kernel;
 mod net;
+mod precision;
 
 pub use error::LearnError;
+pub use precision::Precision;

@@ -12,6 +12,7 @@ use crate::adam::Adam;
 use crate::checkpoint::Archive;
 use crate::error::LearnError;
 use crate::kernel::{self, NormGradient, Normed};
+use crate::precision::{Precision, add_outer, product};
 
 /// Form of a stack of perceptrons.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,10 +25,12 @@ pub(crate) struct NetShape {
     pub(crate) slope: f64,
     /// Whether hidden layers are normalised before the activation.
     pub(crate) layer_norm: bool,
+    /// Of the hidden layers' products.
+    pub(crate) precision: Precision,
 }
 
 impl NetShape {
-    /// `input → hidden… → output`, ReLU, not normalised.
+    /// `input → hidden… → output`, ReLU, not normalised, multiplied as it is stored.
     pub(crate) fn new(n_members: i64, input: i64, hidden: &[i64], output: i64) -> Self {
         let sizes = [&[input], hidden, &[output]].concat();
         Self {
@@ -35,6 +38,7 @@ impl NetShape {
             sizes,
             slope: 0.0,
             layer_norm: false,
+            precision: Precision::F32,
         }
     }
 
@@ -46,6 +50,18 @@ impl NetShape {
             pair[0] * pair[1] + n_vectors * pair[1]
         };
         self.n_members * self.sizes.windows(2).enumerate().map(layer).sum::<i64>()
+    }
+
+    /// Bytes of the weights with their gradient and two moments.
+    pub(crate) fn trained_bytes(&self) -> u64 {
+        4 * 4 * self.n_values() as u64
+    }
+
+    /// Bytes of the layers' outputs for so many rows, kept for the way back, and the gradients
+    /// on it.
+    pub(crate) fn pass_bytes(&self, n_rows: usize) -> u64 {
+        let numbers = self.n_members * self.sizes.iter().sum::<i64>();
+        2 * 4 * numbers as u64 * n_rows as u64
     }
 }
 
@@ -80,6 +96,7 @@ impl Layer {
 pub(crate) struct Net {
     layers: Vec<Layer>,
     slope: f64,
+    precision: Precision,
 }
 
 /// What a forward pass leaves for the way back.
@@ -119,6 +136,7 @@ impl Net {
         Self {
             layers,
             slope: shape.slope,
+            precision: shape.precision,
         }
     }
 
@@ -144,7 +162,7 @@ impl Net {
         let mut x = input.shallow_clone();
         let (last, hidden) = self.layers.split_last().expect("a net has layers");
         for layer in hidden {
-            let mut z = x.bmm(&layer.weight);
+            let mut z = product(&x, &layer.weight);
             let normed = match &layer.norm {
                 None => {
                     kernel::bias_activate(&mut z, &layer.bias, self.slope);
@@ -167,17 +185,19 @@ impl Net {
                 normed,
             });
         }
-        let mut z = x.bmm(&last.weight);
+        let mut z = product(&x.to_kind(last.weight.kind()), &last.weight);
         kernel::bias_activate(&mut z, &last.bias, 1.0);
         (z, input)
     }
 
+    /// One matrix for each member, as the first layer multiplies it.
     fn expanded(&self, input: &Tensor) -> Tensor {
+        let input = self.precision.operand(input);
         match input.size()[..] {
             [rows, columns] => input
                 .unsqueeze(0)
                 .expand([self.layers[0].weight.size()[0], rows, columns], false),
-            _ => input.shallow_clone(),
+            _ => input,
         }
     }
 
@@ -186,35 +206,35 @@ impl Net {
     pub(crate) fn backward(
         &self,
         tape: &Tape,
-        output_gradient: Tensor,
+        output_gradient: &Tensor,
         mut into: Option<&mut Net>,
         columns: Option<Range<i64>>,
     ) -> Option<Tensor> {
-        let mut gradient = output_gradient;
+        let mut gradient = self.precision.operand(output_gradient);
         for (index, layer) in self.layers.iter().enumerate().rev() {
             let mut into = into.as_deref_mut().map(|net| &mut net.layers[index]);
             if let Some(hidden) = tape.hidden.get(index) {
                 self.activation_backward(&mut gradient, hidden, layer, into.as_deref_mut());
             } else if let Some(into) = &mut into {
-                let _ = into
-                    .bias
-                    .g_add_(&gradient.sum_dim_intlist([1_i64].as_slice(), true, None));
+                let rows = [1_i64];
+                let own = output_gradient.sum_dim_intlist(rows.as_slice(), true, None);
+                let _ = into.bias.g_add_(&own);
             }
             if let Some(into) = into {
                 let x = index
                     .checked_sub(1)
                     .map_or(&tape.input, |before| &tape.hidden[before].output);
-                let _ = into.weight.baddbmm_(&x.transpose(1, 2), &gradient);
+                add_outer(&mut into.weight, x, &gradient);
             }
             if index > 0 {
-                gradient = gradient.bmm(&layer.weight.transpose(1, 2));
+                gradient = product(&gradient, &layer.weight.transpose(1, 2));
             }
         }
         let columns = columns?;
         let weight = self.layers[0]
             .weight
             .narrow(1, columns.start, columns.end - columns.start);
-        Some(gradient.bmm(&weight.transpose(1, 2)))
+        Some(product(&gradient, &weight.transpose(1, 2)).to_kind(weight.kind()))
     }
 
     fn activation_backward(

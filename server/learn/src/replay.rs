@@ -23,6 +23,16 @@ pub struct ReplayShape {
     pub pose: usize,
 }
 
+impl ReplayShape {
+    /// Bytes of memory that a step takes, pose and all.
+    pub fn step_bytes(self) -> usize {
+        let learned_reward = 1;
+        let numbers = self.observation + self.pose + self.action + learned_reward;
+        let (task_reward, episode, stage) = (size_of::<f64>(), size_of::<u32>(), size_of::<u8>());
+        numbers * size_of::<f32>() + task_reward + episode + stage + size_of::<StepMark>()
+    }
+}
+
 /// One step as the replay takes it.
 #[derive(Debug, Clone, Copy)]
 pub struct NewStep<'a> {

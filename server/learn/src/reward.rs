@@ -12,6 +12,7 @@ use crate::device::Device;
 use crate::error::LearnError;
 use crate::init;
 use crate::net::{Net, NetShape, Parameters, matrix, to_vec};
+use crate::precision::Precision;
 use crate::replay::Replay;
 
 /// Settings of the ensemble. Defaults: the released settings for MetaWorld.
@@ -37,6 +38,8 @@ pub struct RewardConfig {
     /// of 1. Without it, few answers that are passed over often saturate the tanh, and later
     /// answers can no longer move the reward there. B-Pref's `label_margin`.
     pub label_margin: f64,
+    /// `f32`, or `bf16` for faster and coarser fitting and relabelling.
+    pub precision: Precision,
 }
 
 impl Default for RewardConfig {
@@ -49,7 +52,26 @@ impl Default for RewardConfig {
             max_epochs: 10,
             stop_accuracy: 0.97,
             label_margin: 0.0,
+            precision: Precision::F32,
         }
+    }
+}
+
+impl RewardConfig {
+    /// All members, for states and actions of so many numbers.
+    fn shape(&self, sizes: (usize, usize)) -> NetShape {
+        let columns = (sizes.0 + sizes.1) as i64;
+        NetShape {
+            slope: SLOPE,
+            precision: self.precision,
+            ..NetShape::new(self.members as i64, columns, &self.hidden, 1)
+        }
+    }
+
+    /// Bytes that an ensemble and its fitting hold, whatever the number of preferences.
+    pub fn bytes(&self, observation_size: usize, action_size: usize) -> u64 {
+        let shape = self.shape((observation_size, action_size));
+        shape.trained_bytes() + shape.pass_bytes(CHUNK_ROWS)
     }
 }
 
@@ -119,11 +141,7 @@ impl RewardEnsemble {
         options: (Kind, tch::Device),
     ) -> Self {
         crate::device::init();
-        let columns = (sizes.0 + sizes.1) as i64;
-        let shape = NetShape {
-            slope: SLOPE,
-            ..NetShape::new(config.members as i64, columns, &config.hidden, 1)
-        };
+        let shape = config.shape(sizes);
         let parameters = Parameters::new(shape.n_values(), config.learning_rate, options);
         let mut net = Net::over(&shape, &parameters.values, 0);
         init::uniform(&mut net, &mut Rng::new(seed, Stream::Weights, FIRST_KEY));
@@ -131,7 +149,7 @@ impl RewardEnsemble {
             config: config.clone(),
             seed,
             options,
-            columns,
+            columns: (sizes.0 + sizes.1) as i64,
             gradient: Net::over(&shape, &parameters.gradient, 0),
             parameters,
             net,
@@ -242,7 +260,7 @@ impl RewardEnsemble {
             let slopes = matrix(&chunk.row_slopes(&slopes), 1, self.options).view_as(&reward);
             let gradient = slopes * (1.0 - reward.square());
             self.net
-                .backward(&tape, gradient, Some(&mut self.gradient), None);
+                .backward(&tape, &gradient, Some(&mut self.gradient), None);
         }
     }
 

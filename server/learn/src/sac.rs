@@ -10,6 +10,7 @@ use crate::error::LearnError;
 use crate::init;
 use crate::kernel;
 use crate::net::{Net, NetShape, Parameters, load_tensor, matrix, save_tensor, to_vec};
+use crate::precision::Precision;
 use crate::replay::Batch;
 
 mod policy;
@@ -45,6 +46,8 @@ pub struct SacConfig {
     /// Whether the critics' hidden layers are normalised; the released code's are not. With it,
     /// higher learning rates hold.
     pub layer_norm: bool,
+    /// `f32`, or `bf16` for faster and coarser updates.
+    pub precision: Precision,
 }
 
 impl Default for SacConfig {
@@ -60,7 +63,33 @@ impl Default for SacConfig {
             critic_ema: 0.005,
             target_every: 2,
             layer_norm: false,
+            precision: Precision::F32,
         }
+    }
+}
+
+impl SacConfig {
+    /// Actor and critics for states of `s` and actions of `a` numbers.
+    fn shapes(&self, s: i64, a: i64) -> (NetShape, NetShape) {
+        let precision = self.precision;
+        let actor = NetShape {
+            precision,
+            ..NetShape::new(1, s, &self.hidden, 2 * a)
+        };
+        let critic = NetShape {
+            layer_norm: self.layer_norm,
+            precision,
+            ..NetShape::new(2, s + a, &self.hidden, 1)
+        };
+        (actor, critic)
+    }
+
+    /// Bytes that an agent and its updates hold.
+    pub fn bytes(&self, observation_size: usize, action_size: usize) -> u64 {
+        let (actor, critic) = self.shapes(observation_size as i64, action_size as i64);
+        let target = 4 * critic.n_values() as u64;
+        let passes = actor.pass_bytes(self.batch) + critic.pass_bytes(self.batch);
+        actor.trained_bytes() + critic.trained_bytes() + target + passes
     }
 }
 
@@ -187,11 +216,7 @@ impl Sac {
     ) -> Self {
         crate::device::init();
         let (s, a) = (sizes.0 as i64, sizes.1 as i64);
-        let actor_shape = NetShape::new(1, s, &config.hidden, 2 * a);
-        let critic_shape = NetShape {
-            layer_norm: config.layer_norm,
-            ..NetShape::new(2, s + a, &config.hidden, 1)
-        };
+        let (actor_shape, critic_shape) = config.shapes(s, a);
         let critic = Trained::new(&critic_shape, config.critic_learning_rate, options);
         let target_values = critic.parameters.values.zeros_like();
         let mut sac = Self {
@@ -372,7 +397,7 @@ impl Sac {
         self.critic.parameters.zero_gradient();
         self.critic.net.backward(
             &tape,
-            &error * (2.0 / n),
+            &(&error * (2.0 / n)),
             Some(&mut self.critic.gradient),
             None,
         );
@@ -395,14 +420,14 @@ impl Sac {
         let action_gradient = self
             .critic
             .net
-            .backward(&q_tape, q_gradient, None, Some(s..s + a));
+            .backward(&q_tape, &q_gradient, None, Some(s..s + a));
         let action_gradient = action_gradient.expect("the action's columns were asked for");
         let action_gradient = action_gradient.sum_dim_intlist([0_i64].as_slice(), false, None);
         let gradient = policy.backward(&sample, noise, &action_gradient, alpha / n);
         self.actor.parameters.zero_gradient();
         self.actor
             .net
-            .backward(&tape, gradient, Some(&mut self.actor.gradient), None);
+            .backward(&tape, &gradient, Some(&mut self.actor.gradient), None);
         let entropy = -sample.log_probability.mean(None).double_value(&[]);
         let loss = -alpha * entropy - value.mean(None).double_value(&[]);
         (loss, entropy)

@@ -60,6 +60,27 @@ impl Default for TemporalConfig {
     }
 }
 
+impl TemporalConfig {
+    /// Trunk, encoder and potential for states of so many numbers.
+    fn shapes(&self, observation_size: usize) -> [NetShape; 3] {
+        let (s, d) = (observation_size as i64, self.latent);
+        [
+            NetShape::new(1, s, &self.hidden, d),
+            NetShape::new(1, d, &[d], d),
+            NetShape::new(1, d, &[d], 1),
+        ]
+    }
+
+    /// Bytes that the distance and its steps hold: nets, both ends of each pair on their way
+    /// through them, and a few numbers for each two pairs of a step.
+    pub fn bytes(&self, observation_size: usize) -> u64 {
+        let net = |shape: &NetShape| shape.trained_bytes() + shape.pass_bytes(2 * self.batch);
+        let nets: u64 = self.shapes(observation_size).iter().map(net).sum();
+        let two_pairs = 4 * 4;
+        nets + two_pairs * (self.batch as u64).pow(2)
+    }
+}
+
 /// Which softmax tells the positive from the other states of the batch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -159,12 +180,7 @@ impl TemporalDistance {
         options: (Kind, tch::Device),
     ) -> Self {
         crate::device::init();
-        let (s, d) = (observation_size as i64, config.latent);
-        let shapes = [
-            NetShape::new(1, s, &config.hidden, d),
-            NetShape::new(1, d, &[d], d),
-            NetShape::new(1, d, &[d], 1),
-        ];
+        let shapes = config.shapes(observation_size);
         let n_values = shapes.iter().map(NetShape::n_values).sum();
         let parameters = Parameters::new(n_values, config.learning_rate, options);
         let mut nets = Nets::over(&shapes, &parameters.values);
@@ -176,7 +192,7 @@ impl TemporalDistance {
             config: config.clone(),
             seed,
             options,
-            observation_size: s,
+            observation_size: observation_size as i64,
             gradients: Nets::over(&shapes, &parameters.gradient),
             parameters,
             nets,
@@ -259,13 +275,13 @@ impl TemporalDistance {
         let into = &mut self.gradients;
         let encoder = self.nets.encoder.backward(
             &encoder_tape,
-            latent_slope,
+            &latent_slope,
             Some(&mut into.encoder),
             Some(d.clone()),
         );
         let potential = self.nets.potential.backward(
             &potential_tape,
-            potential_slope,
+            &potential_slope,
             Some(&mut into.potential),
             Some(d),
         );
@@ -275,7 +291,7 @@ impl TemporalDistance {
         let _ = trunk_slope.narrow(1, n, n).g_add_(&later_slope);
         self.nets
             .trunk
-            .backward(&trunk_tape, trunk_slope, Some(&mut into.trunk), None);
+            .backward(&trunk_tape, &trunk_slope, Some(&mut into.trunk), None);
         (loss, accuracy)
     }
 

@@ -50,7 +50,7 @@ pub struct Args {
     /// Environment steps in all
     #[arg(long)]
     steps: Option<u64>,
-    /// cpu or cuda
+    /// cpu or cuda; a run may go on on another device than it began on
     #[arg(long)]
     device: Option<String>,
     /// The run's folder [default: data/train/TASK-METHOD-SEED]
@@ -119,7 +119,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 
 fn open(args: &Args) -> anyhow::Result<(Run, PathBuf)> {
     if let Some(folder) = &args.resume {
-        let (run, complaints) = Run::resume(folder).map_err(BadInput::from_error)?;
+        let (run, complaints) =
+            Run::resume_on(folder, args.device.as_deref()).map_err(BadInput::from_error)?;
         for complaint in complaints {
             eprintln!("Passed over a damaged checkpoint. {complaint}");
         }

@@ -216,11 +216,10 @@ fn card(task: &'static sim::tasks::Task) -> TaskCard {
     }
 }
 
-/// A drawn picture where there is one, a sketch otherwise.
+/// A frame of the task where there is one, a sketch otherwise.
 fn picture(task: &str) -> String {
-    let names = ["webp", "svg"].map(|kind| format!("cards/{task}.{kind}"));
-    let found = names.into_iter().find(|name| assets::contains(name));
-    format!("/static/{}", found.as_deref().unwrap_or("cards/any.svg"))
+    let own = Some(format!("cards/{task}.webp")).filter(|name| assets::contains(name));
+    format!("/static/{}", own.as_deref().unwrap_or("cards/any.svg"))
 }
 
 /// `about 10 minutes`, `about 2 hours`.

@@ -15,7 +15,7 @@ fn normals(size: [i64; 3], step: u64) -> Tensor {
 
 /// The same numbers for both roads: first rounded to what half precision can hold.
 fn both(size: [i64; 3], step: u64) -> (Tensor, Tensor) {
-    let half = normals(size, step).to_kind(Kind::BFloat16);
+    let half = normals(size, step).to_kind(Kind::Half);
     (half.to_kind(Kind::Float), half)
 }
 

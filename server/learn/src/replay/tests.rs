@@ -156,3 +156,26 @@ fn damage_and_other_tasks_are_named() {
     assert!(error.to_string().contains("journal"), "{error}");
     std::fs::remove_dir_all(folder).expect("removed");
 }
+
+#[test]
+fn a_step_takes_the_bytes_that_its_shape_says() {
+    let mut replay = Replay::new(SHAPE, 2);
+    push_steps(&mut replay, 0, 35);
+    let bytes = |lane: &Lane| {
+        size_of_val(&lane.observations[..])
+            + size_of_val(&lane.poses[..])
+            + size_of_val(&lane.stages[..])
+            + size_of_val(&lane.actions[..])
+            + size_of_val(&lane.learned_rewards[..])
+            + size_of_val(&lane.task_rewards[..])
+            + size_of_val(&lane.marks[..])
+            + size_of_val(&lane.episode_of[..])
+    };
+    let held: usize = replay.lanes.iter().map(bytes).sum();
+    let first_state = 4 * (SHAPE.observation + SHAPE.pose) + 1;
+    let n_first_states = replay.n_episodes();
+    assert_eq!(
+        held - n_first_states * first_state,
+        replay.len() * SHAPE.step_bytes()
+    );
+}

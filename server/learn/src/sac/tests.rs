@@ -1,6 +1,9 @@
 use super::*;
 
 const SIZES: (usize, usize) = (5, 3);
+/// How far a bf16 gradient may be from that of f32 at initialisation, relative to its norm.
+const CRITIC_BOUND: f64 = 0.03;
+const ACTOR_BOUND: f64 = 0.01;
 const DOUBLE: (Kind, tch::Device) = (Kind::Double, tch::Device::Cpu);
 
 fn small(layer_norm: bool) -> SacConfig {
@@ -131,6 +134,57 @@ fn the_written_out_gradients_are_autograds() {
     }
 }
 
+/// Gradients of critics and actor on one batch at initialisation.
+fn first_gradients(config: &SacConfig) -> [Tensor; 2] {
+    let mut sac = Sac::new(config, 39, 4, 3, Device::CPU);
+    let mut rng = Rng::new(4, Stream::Test, 0);
+    let mut normals = |n: usize| {
+        let mut values = vec![0.0; n];
+        rng.fill_normal(&mut values);
+        values
+    };
+    let n = config.batch;
+    let rows = sac.rows(&Batch {
+        observation: normals(n * 39),
+        action: normals(n * 4).iter().map(|x| x.tanh()).collect(),
+        reward: normals(n),
+        next_observation: normals(n * 39),
+        not_terminal: vec![1.0; n],
+    });
+    let noise = |sac: &Sac, step| sac.noise(n as i64, &mut Rng::new(1, Stream::Test, step));
+    let (next_noise, noise) = (noise(&sac, 1), noise(&sac, 2));
+    let target = sac.bellman_target(&rows, &next_noise, 0.1);
+    sac.critic_gradient(&rows, &target);
+    sac.actor_gradient(&rows, &noise, 0.1);
+    [&sac.critic, &sac.actor].map(|net| net.parameters.gradient.copy())
+}
+
+/// Here 2.6 % and 0.5 %, with LayerNorm 1.9 % and 0.6 %. The critics' rounding is as small as the
+/// actor's, but their gradient is a sum whose terms nearly cancel.
+#[test]
+fn bf16_gradients_are_those_of_f32_within_a_few_percent() {
+    for layer_norm in [false, true] {
+        let exact = SacConfig {
+            layer_norm,
+            ..SacConfig::default()
+        };
+        let coarse = SacConfig {
+            precision: Precision::Bf16,
+            ..exact.clone()
+        };
+        let (exact, coarse) = (first_gradients(&exact), first_gradients(&coarse));
+        for (net, bound) in [(0, CRITIC_BOUND), (1, ACTOR_BOUND)] {
+            let difference = (&coarse[net] - &exact[net]).norm().double_value(&[]);
+            let error = difference / exact[net].norm().double_value(&[]);
+            assert!(error > 0.0, "net {net} was not multiplied in bf16");
+            assert!(
+                error < bound,
+                "net {net} off by {error} (layer norm {layer_norm})"
+            );
+        }
+    }
+}
+
 fn fingerprint(sac: &Sac) -> String {
     let mut archive = Archive::new();
     sac.save(&mut archive);
@@ -139,8 +193,16 @@ fn fingerprint(sac: &Sac) -> String {
 
 #[test]
 fn an_interrupted_agent_goes_on_bit_for_bit() {
-    let config = small(true);
-    let new = || Sac::new(&config, SIZES.0, SIZES.1, 3, Device::CPU);
+    for precision in [Precision::F32, Precision::Bf16] {
+        goes_on_bit_for_bit(&SacConfig {
+            precision,
+            ..small(true)
+        });
+    }
+}
+
+fn goes_on_bit_for_bit(config: &SacConfig) {
+    let new = || Sac::new(config, SIZES.0, SIZES.1, 3, Device::CPU);
     let mut uninterrupted = new();
     let mut archive = Archive::new();
     for step in 0..8 {
@@ -191,7 +253,14 @@ fn a_reset_replaces_the_critics_and_nothing_else() {
 /// A one-step task whose best action is ½ in each coordinate.
 #[test]
 fn the_agent_finds_the_better_action() {
+    for precision in [Precision::F32, Precision::Bf16] {
+        finds_the_better_action(precision);
+    }
+}
+
+fn finds_the_better_action(precision: Precision) {
     let config = SacConfig {
+        precision,
         discount: 0.0,
         initial_temperature: 0.01,
         actor_learning_rate: 3e-3,
