@@ -161,6 +161,11 @@ impl RunFolder {
         Ok(steps)
     }
 
+    /// Where a finished run leaves its policy: small, and all that looking at it takes.
+    pub(crate) fn policy_path(&self) -> PathBuf {
+        self.root.join("policy.stair")
+    }
+
     /// Where the checkpoint of a step lies.
     pub(crate) fn checkpoint_path(&self, step: u64) -> PathBuf {
         self.root.join(format!("checkpoint-{step:09}.stair"))

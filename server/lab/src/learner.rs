@@ -150,6 +150,11 @@ impl Learner {
         self.agent.act(observations, Act::Mean)
     }
 
+    /// What it takes to act, and nothing of what it takes to learn on.
+    pub(crate) fn save_policy(&self, archive: &mut Archive) {
+        self.agent.save_policy(archive);
+    }
+
     /// Weights, moments and counters of all parts.
     pub(crate) fn save(&self, archive: &mut Archive) {
         self.agent.save(archive);

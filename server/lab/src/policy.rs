@@ -1,4 +1,4 @@
-//! The trained policy inside a checkpoint, to be looked at rather than trained on.
+//! A trained policy, to be looked at rather than trained on.
 
 use std::path::{Path, PathBuf};
 
@@ -18,7 +18,8 @@ pub struct TrainedPolicy {
 }
 
 impl TrainedPolicy {
-    /// Opens a checkpoint file, or the newest readable one of a run's folder.
+    /// Opens a checkpoint or policy file, or of a run's folder the newest checkpoint that can be
+    /// read, else the policy that the finished run left.
     ///
     /// # Errors
     /// When there is none, or it is damaged.
@@ -28,8 +29,11 @@ impl TrainedPolicy {
         }
         let (folder, _) = RunFolder::open(path)?;
         let mut reasons = Vec::new();
-        for step in folder.checkpoints()?.into_iter().rev() {
-            match Self::read(&folder.checkpoint_path(step)) {
+        let checkpoints = folder.checkpoints()?.into_iter().rev();
+        let checkpoints = checkpoints.map(|step| folder.checkpoint_path(step));
+        let left = Some(folder.policy_path()).filter(|path| path.exists());
+        for path in checkpoints.chain(left) {
+            match Self::read(&path) {
                 Ok(policy) => return Ok(policy),
                 Err(error) => reasons.push(error.to_string()),
             }
@@ -55,7 +59,7 @@ impl TrainedPolicy {
         let device = Device::open("cpu")?;
         let (s, a) = (spec.observation_size, spec.action_size);
         let mut agent = Sac::new(&config.agent, s, a, config.seed, device);
-        agent.load(&archive)?;
+        agent.load_policy(&archive)?;
         Ok(Self {
             agent,
             config,

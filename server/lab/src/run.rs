@@ -597,9 +597,17 @@ impl Run {
             return_mean,
             weights: self.learner.fingerprint(),
         };
+        self.leave_policy()?;
         self.say(Event::Finished(finished.clone()), events)?;
         self.checkpoint_and_say(events)?;
         Ok(Outcome::Finished(finished))
+    }
+
+    fn leave_policy(&self) -> Result<(), RunError> {
+        let mut archive = Archive::new();
+        self.learner.save_policy(&mut archive);
+        archive.put_json("config", &self.config.to_toml());
+        Ok(archive.write(&self.folder.policy_path())?)
     }
 
     fn checkpoint_and_say(&mut self, events: &mut dyn FnMut(Event)) -> Result<(), RunError> {

@@ -11,6 +11,7 @@ use domain::query::{OfferedQuery, QueryKey};
 use domain::teacher::{Answered, Oracle, Scripted, Teacher, TeacherError, judge};
 use lab::config::{Layers, RunConfig};
 use lab::message::{Activity, Command, Event};
+use lab::policy::TrainedPolicy;
 use lab::run::{Outcome, Run};
 
 /// A run's folder that goes when the test ends.
@@ -110,6 +111,24 @@ fn a_run_stopped_again_and_again_ends_with_the_same_bits() {
         }
     }
     panic!("the run did not finish");
+}
+
+#[test]
+fn the_policy_that_a_finished_run_leaves_acts_as_its_checkpoint_does() {
+    let folder = Folder::new("policy");
+    let mut run = Run::start(short(), &folder.0).unwrap();
+    finished(drive(&mut run, &mut Scripted::new(Box::new(Oracle), 0)).0);
+    let states: Vec<f32> = (0..34_u8).map(|i| (f32::from(i) * 0.7).sin()).collect();
+    let act = |path: &std::path::Path| TrainedPolicy::open(path).unwrap().act(&states);
+    let of_checkpoint = act(&folder.0);
+    assert_eq!(act(&folder.0.join("policy.stair")), of_checkpoint);
+
+    let names = std::fs::read_dir(&folder.0)
+        .unwrap()
+        .map(|e| e.unwrap().path());
+    let checkpoints = names.filter(|path| path.to_string_lossy().contains("checkpoint-"));
+    checkpoints.for_each(|path| std::fs::remove_file(path).unwrap());
+    assert_eq!(act(&folder.0), of_checkpoint);
 }
 
 #[test]

@@ -324,9 +324,22 @@ impl Sac {
         self.n_updates
     }
 
+    /// The actor's weights alone: all that acting takes.
+    pub fn save_policy(&self, archive: &mut Archive) {
+        save_tensor(&self.actor.parameters.values, ACTOR_SECTION, archive);
+    }
+
+    /// What [`Sac::save_policy`] or [`Sac::save`] wrote of the actor; all else stays as it is.
+    ///
+    /// # Errors
+    /// When the section is missing or of another network.
+    pub fn load_policy(&mut self, archive: &Archive) -> Result<(), LearnError> {
+        load_tensor(&mut self.actor.parameters.values, ACTOR_SECTION, archive)
+    }
+
     /// Weights, moments, temperature and counters.
     pub fn save(&self, archive: &mut Archive) {
-        self.actor.parameters.save("sac.actor", archive);
+        self.actor.parameters.save(ACTOR_SECTION, archive);
         self.critic.parameters.save("sac.critic", archive);
         save_tensor(&self.target_values, "sac.target", archive);
         let t = &self.temperature;
@@ -342,7 +355,7 @@ impl Sac {
     /// # Errors
     /// When a section is missing or of another network; part of the agent may then be loaded.
     pub fn load(&mut self, archive: &Archive) -> Result<(), LearnError> {
-        self.actor.parameters.load("sac.actor", archive)?;
+        self.actor.parameters.load(ACTOR_SECTION, archive)?;
         self.critic.parameters.load("sac.critic", archive)?;
         load_tensor(&mut self.target_values, "sac.target", archive)?;
         let [log_alpha, first, second] = archive.f64("sac.temperature")?;
@@ -434,6 +447,8 @@ impl Sac {
     }
 }
 
+/// Where the actor's weights lie in an archive.
+const ACTOR_SECTION: &str = "sac.actor";
 /// Keys of initial weights: the actor, then the critics of each reset.
 const ACTOR: u64 = 0;
 const FIRST_CRITIC: u64 = 1_000;
