@@ -5,8 +5,9 @@
 use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
 
-use domain::sampler::StageCoefficients;
+use domain::sampler::{SAMPLERS, SamplerSettings, StageCoefficients, sampler};
 use domain::schedule::FeedbackSchedule;
+use domain::teacher::TeacherSettings;
 use learn::exploration::ExplorationConfig;
 use learn::reward::RewardConfig;
 use learn::sac::SacConfig;
@@ -43,6 +44,8 @@ pub struct RunConfig {
     pub queries: QueriesConfig,
     /// When it is asked.
     pub feedback: FeedbackSchedule,
+    /// How irregular scripted teachers are.
+    pub teacher: TeacherSettings,
     /// How the policy is tried.
     pub evaluation: EvaluationConfig,
 }
@@ -62,6 +65,7 @@ impl Default for RunConfig {
             temporal: TemporalConfig::default(),
             queries: QueriesConfig::default(),
             feedback: FeedbackSchedule::default(),
+            teacher: TeacherSettings::default(),
             evaluation: EvaluationConfig::default(),
         }
     }
@@ -141,8 +145,18 @@ pub struct QueriesConfig {
     pub candidates_per_query: u32,
     /// Only the newest so many complete episodes are asked about; 100 in the released code.
     pub newest_episodes: usize,
+    /// A name of [`SAMPLERS`]; empty takes the method's own.
+    pub sampler: String,
     /// c_stage and c_state of STAIR's score.
     pub coefficients: StageCoefficients,
+    /// Whether the stage gap is the mean of both directions; the paper's is one way.
+    pub symmetric_gap: bool,
+    /// Newest complete episodes that count as near the policy, QPA's N: 10 in its released
+    /// settings, 60 for door-open, 30 for door-unlock and drawer-open.
+    pub near_policy_episodes: usize,
+    /// Whether segments never take an episode's last possible start, a slip of the released
+    /// code.
+    pub bpref_starts: bool,
     /// Share of queries that also ask whether both segments show the same stage, [0, 1].
     pub same_stage_fraction: f64,
     /// Whether indistinguishable answers train towards (½, ½) or are dropped.
@@ -158,10 +172,24 @@ impl Default for QueriesConfig {
             segment_len: 0,
             candidates_per_query: 10,
             newest_episodes: 100,
+            sampler: String::new(),
             coefficients: StageCoefficients::default(),
+            symmetric_gap: false,
+            near_policy_episodes: 10,
+            bpref_starts: false,
             same_stage_fraction: 0.0,
             train_on_equal: true,
             sufficient_fraction: 1.0,
+        }
+    }
+}
+
+impl QueriesConfig {
+    /// What a sampler is made with.
+    pub fn sampler_settings(&self) -> SamplerSettings {
+        SamplerSettings {
+            coefficients: self.coefficients,
+            near_policy_episodes: self.near_policy_episodes,
         }
     }
 }
@@ -263,6 +291,16 @@ pub const PRESETS: &[(&str, &str, &str)] = &[
         "stair",
         "",
         include_str!("../../../assets/presets/method/stair.toml"),
+    ),
+    (
+        "stair_isr",
+        "",
+        include_str!("../../../assets/presets/method/stair_isr.toml"),
+    ),
+    (
+        "timestep",
+        "",
+        include_str!("../../../assets/presets/method/timestep.toml"),
     ),
     (
         "task",
@@ -422,6 +460,14 @@ impl RunConfig {
         if q.candidates_per_query == 0 {
             return out("queries.candidates_per_query", "0".into(), "at least 1");
         }
+        if q.near_policy_episodes == 0 {
+            return out("queries.near_policy_episodes", "0".into(), "at least 1");
+        }
+        if !q.sampler.is_empty() && sampler(&q.sampler, &q.sampler_settings()).is_none() {
+            let known = SAMPLERS.iter().map(|(name, _)| *name);
+            return Err(unknown("sampler", &q.sampler, known));
+        }
+        self.check_teacher()?;
         if q.newest_episodes == 0 {
             return out("queries.newest_episodes", "0".into(), "at least 1");
         }
@@ -434,6 +480,37 @@ impl RunConfig {
                 q.segment_len.to_string(),
                 "at most an episode's length",
             );
+        }
+        Ok(())
+    }
+}
+
+impl RunConfig {
+    fn check_teacher(&self) -> Result<(), ConfigError> {
+        let t = &self.teacher;
+        let shares = [
+            ("teacher.mistake", t.mistake),
+            ("teacher.inconsistent_mistake", t.inconsistent_mistake),
+            ("teacher.equal", t.equal),
+            ("teacher.skip", t.skip),
+        ];
+        let out = |key, value: f64, must_be| {
+            Err(ConfigError::OutOfRange {
+                key,
+                value: value.to_string(),
+                must_be,
+            })
+        };
+        for (key, value) in shares {
+            if !(0.0..=1.0).contains(&value) {
+                return out(key, value, "from 0 to 1");
+            }
+        }
+        if !(t.discount > 0.0 && t.discount <= 1.0) {
+            return out("teacher.discount", t.discount, "above 0, at most 1");
+        }
+        if !(t.rationality > 0.0 && t.rationality.is_finite()) {
+            return out("teacher.rationality", t.rationality, "a number above 0");
         }
         Ok(())
     }
@@ -618,6 +695,10 @@ mod tests {
         for bad in [
             "environment.n_envs=0",
             "queries.same_stage_fraction=1.5",
+            "queries.sampler=disagrement",
+            "queries.near_policy_episodes=0",
+            "teacher.mistake=1.5",
+            "teacher.discount=0.0",
             "seed=many",
             "seed",
             "feedback.every=0",

@@ -55,7 +55,7 @@ impl Learner {
         Self {
             reward: RewardEnsemble::new(&config.reward, s, a, seed, device),
             temporal: method
-                .learns_temporal_distance
+                .learns_temporal_distance()
                 .then(|| TemporalDistance::new(&config.temporal, s, seed, device)),
             agent: Sac::new(&config.agent, s, a, seed, device),
             exploration: StateEntropy::new(&config.exploration),

@@ -1,13 +1,16 @@
 //! Methods as recipes of parts. The table of baselines is this folder.
 
-use domain::sampler::QuerySampler;
+use domain::sampler::{QuerySampler, SAMPLERS, sampler};
 use learn::replay::RewardSource;
+use learn::stage::StageApproximator;
 
 use crate::config::{ConfigError, RunConfig, unknown};
 
 mod pebble;
 mod sac;
 mod stair;
+mod stair_isr;
+mod timestep;
 mod uniform;
 
 /// What makes one method differ from another.
@@ -16,8 +19,28 @@ pub struct Method {
     pub sampler: Option<Box<dyn QuerySampler>>,
     /// What the critics learn from once exploration is over.
     pub reward: RewardSource,
+    /// What the stage gap is, for methods that have one.
+    pub stage: Option<StageApproximator>,
+}
+
+impl Method {
     /// Whether a temporal distance is learned.
-    pub learns_temporal_distance: bool,
+    pub fn learns_temporal_distance(&self) -> bool {
+        self.stage
+            .is_some_and(StageApproximator::needs_temporal_distance)
+    }
+
+    /// The same method with another way of choosing; one that asks for a stage gap brings the
+    /// paper's along where the method has none.
+    #[must_use]
+    fn choosing_with(self, sampler: Box<dyn QuerySampler>, config: &RunConfig) -> Self {
+        let gap = sampler.needs_stage_gap().then(|| stair::gap(config));
+        Self {
+            stage: self.stage.or(gap),
+            sampler: Some(sampler),
+            ..self
+        }
+    }
 }
 
 /// A line of the registry.
@@ -48,11 +71,36 @@ pub const METHODS: &[MethodEntry] = &[
         build: uniform::uniform,
     },
     MethodEntry {
+        name: "stair_isr",
+        summary: "STAIR with stages as intervals of learned distances",
+        build: stair_isr::stair_isr,
+    },
+    MethodEntry {
+        name: "timestep",
+        summary: "STAIR with the step of the episode for a stage",
+        build: timestep::timestep,
+    },
+    MethodEntry {
         name: "sac",
         summary: "learns from the task reward: the upper bound",
         build: sac::sac,
     },
 ];
+
+/// The recipe that the settings ask for.
+///
+/// # Errors
+/// Names the nearest right method or sampler.
+pub fn build(config: &RunConfig) -> Result<Method, ConfigError> {
+    let method = (find(&config.method)?.build)(config);
+    let (name, settings) = (&config.queries.sampler, config.queries.sampler_settings());
+    if name.is_empty() || method.sampler.is_none() {
+        return Ok(method);
+    }
+    let known = SAMPLERS.iter().map(|(name, _)| *name);
+    let sampler = sampler(name, &settings).ok_or_else(|| unknown("sampler", name, known))?;
+    Ok(method.choosing_with(sampler, config))
+}
 
 /// The method of that name.
 ///

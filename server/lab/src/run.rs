@@ -34,6 +34,9 @@ use crate::session::{Selection, Session};
 /// How long the loop rests when there is nothing to do but wait for people.
 const REST: Duration = Duration::from_millis(20);
 
+/// Newest episodes by which scripted teachers measure, as in B-Pref.
+const TYPICAL_EPISODES: usize = 10;
+
 /// Held-out episodes are the same for every run, so that runs can be compared.
 const HELD_OUT: u64 = 0;
 
@@ -123,7 +126,7 @@ impl Run {
     pub fn start(config: RunConfig, folder: &Path) -> Result<Self, RunError> {
         let task = find_task(&config.task)?;
         let spec = (task.spec)();
-        let method = (method::find(&config.method)?.build)(&config);
+        let method = method::build(&config)?;
         let learner = Learner::new(&config, &spec, &method, Device::open(&config.device)?);
         let mut replay = Replay::new(shape(&spec), config.environment.n_envs);
         let lanes = Lanes::start(task, config.environment.n_envs, config.seed, &mut replay);
@@ -190,7 +193,7 @@ impl Run {
         let archive = Archive::read(&folder.checkpoint_path(step))?;
         let task = find_task(&config.task)?;
         let spec = (task.spec)();
-        let method = (method::find(&config.method)?.build)(&config);
+        let method = method::build(&config)?;
         let mut learner = Learner::new(&config, &spec, &method, Device::open(&config.device)?);
         learner.load(&archive)?;
         let lanes = Lanes::restore(task, config.seed, archive.json::<LanesState>("lanes")?)?;
@@ -355,13 +358,15 @@ impl Run {
         let mut rng = Rng::new(self.config.seed, Stream::Candidates, u64::from(index));
         let n_candidates = (size * queries.candidates_per_query) as usize;
         let segment_len = self.config.segment_len(&self.spec);
-        let candidates = candidates::draw(
-            &self.replay,
-            queries.newest_episodes,
+        let own = self.method.sampler.as_ref();
+        let newest_episodes = own.and_then(|sampler| sampler.newest_episodes());
+        let pool = candidates::Pool {
+            newest_episodes: newest_episodes.unwrap_or(queries.newest_episodes),
             segment_len,
-            n_candidates,
-            &mut rng,
-        );
+            leaves_last_start: queries.bpref_starts,
+        };
+        let candidates = pool.draw(&self.replay, n_candidates, &mut rng);
+        let asked = self.preferences.asked();
         let sampler: &dyn QuerySampler = match &self.method.sampler {
             Some(sampler) if self.progress.n_fits > 0 => sampler.as_ref(),
             _ => &Uniform, // nothing is believed before the first fit
@@ -370,6 +375,8 @@ impl Run {
             replay: &self.replay,
             reward: &self.learner.reward,
             temporal: self.learner.temporal.as_ref(),
+            stage: self.method.stage,
+            asked: &asked,
         };
         let selection = Selection {
             index,
@@ -377,6 +384,7 @@ impl Run {
             seed: self.config.seed,
             same_stage_fraction: queries.same_stage_fraction,
             candidates: &candidates,
+            typical_reward: self.replay.typical_reward(TYPICAL_EPISODES),
         };
         let session = Session::choose(&selection, sampler, &mut beliefs);
         let report = session.report(self.progress.step, &candidates, &mut beliefs, &self.replay);
@@ -478,7 +486,7 @@ impl Run {
             },
             is_exploring,
             reward: self.method.reward,
-            n_temporal: if self.method.learns_temporal_distance && self.progress.n_fits > 0 {
+            n_temporal: if self.method.learns_temporal_distance() && self.progress.n_fits > 0 {
                 Every(self.config.temporal.update_every).n_crossed(before, now)
             } else {
                 0

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use std::sync::mpsc::channel;
 
 use domain::query::{OfferedQuery, QueryKey};
-use domain::teacher::{Answered, Oracle, Scripted, Teacher, TeacherError, judge};
+use domain::teacher::{Answered, Oracle, Scripted, Teacher, TeacherError, TeacherSettings, judge};
 use lab::config::{Layers, RunConfig};
 use lab::message::{Activity, Command, Event};
 use lab::run::{Outcome, Run};
@@ -254,7 +254,14 @@ fn answers_teach_the_task_and_a_coin_does_not() {
         let folder = Folder::new(teacher);
         let settings = ["evaluation.every=0", "training.total_steps=28000"];
         let mut run = Run::start(resolve("stair", &["quick"], &settings), &folder.0).unwrap();
-        finished(drive(&mut run, &mut Scripted::new(judge(teacher, 1).unwrap(), 0)).0).return_mean
+        finished(
+            drive(
+                &mut run,
+                &mut Scripted::new(judge(teacher, 1, &TeacherSettings::default()).unwrap(), 0),
+            )
+            .0,
+        )
+        .return_mean
     };
     let (taught, untaught) = (task_return("oracle"), task_return("coin"));
     assert!(

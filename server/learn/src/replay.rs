@@ -283,6 +283,17 @@ impl Replay {
         &self.complete
     }
 
+    /// Mean task reward of a step over the `n` newest complete episodes; `None` before the first.
+    pub fn typical_reward(&self, n: usize) -> Option<TaskReward> {
+        let newest = &self.complete[self.complete.len().saturating_sub(n)..];
+        let total = |value: &dyn Fn(&Episode) -> f64| -> f64 {
+            let episodes = newest.iter().map(|id| &self.episodes[id.0 as usize]);
+            episodes.map(value).sum()
+        };
+        let n_steps = total(&|e| f64::from(e.len));
+        (n_steps > 0.0).then(|| TaskReward(total(&|e| e.task_return) / n_steps))
+    }
+
     /// State before step `t` of an episode, `[S]`; `t` = its length gives the final state.
     ///
     /// # Panics

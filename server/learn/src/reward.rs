@@ -334,6 +334,18 @@ pub(crate) fn disagreement(probabilities: &[Vec<f32>]) -> Vec<f32> {
     (0..n_queries).map(std).collect()
 }
 
+/// Mean over members of −Σ p ln p of P(second ≻ first) and its opposite, nats, `[N]`.
+pub(crate) fn entropy(probabilities: &[Vec<f32>]) -> Vec<f32> {
+    let n_members = probabilities.len() as f32;
+    let n_queries = probabilities.first().map_or(0, Vec::len);
+    let own = |p: f32| {
+        let part = |p: f32| if p > 0.0 { -p * p.ln() } else { 0.0 };
+        part(p) + part(1.0 - p)
+    };
+    let mean = |query: usize| probabilities.iter().map(|m| own(m[query])).sum::<f32>() / n_members;
+    (0..n_queries).map(mean).collect()
+}
+
 /// Rows of several pairs, first then second segment, each padded to the longest.
 struct Chunk {
     /// `[2 · pairs · longest × (S + A)]`.

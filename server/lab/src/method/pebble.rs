@@ -11,6 +11,6 @@ pub(crate) fn pebble(_config: &RunConfig) -> Method {
     Method {
         sampler: Some(Box::new(Disagreement)),
         reward: RewardSource::Learned,
-        learns_temporal_distance: false,
+        stage: None,
     }
 }

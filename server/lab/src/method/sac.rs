@@ -10,6 +10,6 @@ pub(crate) fn sac(_config: &RunConfig) -> Method {
     Method {
         sampler: None,
         reward: RewardSource::Task,
-        learns_temporal_distance: false,
+        stage: None,
     }
 }

@@ -239,4 +239,7 @@ fn swapped_segments_swap_the_probability() {
     }
     let std = disagreement(&[vec![0.2, 0.5], vec![0.6, 0.5]]);
     assert!((std[0] - 0.2).abs() < 1e-6 && std[1] == 0.0);
+    let unsure = entropy(&[vec![0.5, 1.0], vec![0.5, 0.5]]);
+    let ln_2 = std::f32::consts::LN_2;
+    assert!((unsure[0] - ln_2).abs() < 1e-6 && (unsure[1] - 0.5 * ln_2).abs() < 1e-6);
 }
