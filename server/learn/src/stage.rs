@@ -151,15 +151,24 @@ mod tests {
         replay
     }
 
+    fn temporal() -> TemporalDistance {
+        let config = TemporalConfig {
+            hidden: vec![16],
+            latent: 8,
+            ..TemporalConfig::default()
+        };
+        TemporalDistance::new(&config, 2, 1, Device::CPU)
+    }
+
     #[test]
     fn intervals_are_equal_nested_touching_or_far_apart() {
-        let gap = |a, b| interval_gap(a, b);
-        assert_eq!(gap((1.0, 3.0), (1.0, 3.0)), 0.0);
-        assert_eq!(gap((0.0, 10.0), (1.0, 2.0)), 0.45); // the paper's index would be 4.5
-        assert_eq!(gap((0.0, 1.0), (1.0, 2.0)), 0.5);
-        assert_eq!(gap((0.0, 1.0), (9.0, 10.0)), 0.9);
-        assert_eq!(gap((2.0, 2.0), (2.0, 2.0)), 0.0);
-        assert_eq!(gap((9.0, 10.0), (0.0, 1.0)), gap((0.0, 1.0), (9.0, 10.0)));
+        let close = |a, b, expected: f32| (interval_gap(a, b) - expected).abs() < 1e-6;
+        assert!(close((1.0, 3.0), (1.0, 3.0), 0.0));
+        assert!(close((0.0, 10.0), (1.0, 2.0), 0.45)); // the paper's index would be 4.5
+        assert!(close((0.0, 1.0), (1.0, 2.0), 0.5));
+        assert!(close((0.0, 1.0), (9.0, 10.0), 0.9));
+        assert!(close((9.0, 10.0), (0.0, 1.0), 0.9));
+        assert!(close((2.0, 2.0), (2.0, 2.0), 0.0));
     }
 
     /// With H = 5, ISR = (4 − D)/(4 + D) for starts D apart.
@@ -179,12 +188,7 @@ mod tests {
     #[test]
     fn the_symmetric_gap_is_the_same_from_either_side_and_the_papers_is_not() {
         let replay = replay();
-        let config = TemporalConfig {
-            hidden: vec![16],
-            latent: 8,
-            ..TemporalConfig::default()
-        };
-        let temporal = TemporalDistance::new(&config, 2, 1, Device::CPU);
+        let temporal = temporal();
         let gap =
             |how: StageApproximator, a, b| how.gap(&replay, Some(&temporal), &[query(a, b, 5)])[0];
         let (a, b) = ((0, 2), (1, 20));
@@ -203,12 +207,7 @@ mod tests {
     #[test]
     fn intervals_of_a_segment_with_itself_have_no_gap() {
         let replay = replay();
-        let config = TemporalConfig {
-            hidden: vec![16],
-            latent: 8,
-            ..TemporalConfig::default()
-        };
-        let temporal = TemporalDistance::new(&config, 2, 1, Device::CPU);
+        let temporal = temporal();
         let queries = [query((0, 3), (0, 3), 5), query((0, 3), (0, 20), 5)];
         let gaps = StageApproximator::Intervals.gap(&replay, Some(&temporal), &queries);
         assert!(gaps[0].abs() < 1e-6 && gaps[1] > 0.1, "{gaps:?}");
