@@ -8,8 +8,8 @@ use toml::{Table, Value};
 use domain::sampler::{SAMPLERS, SamplerSettings, StageCoefficients, sampler};
 use domain::schedule::FeedbackSchedule;
 use domain::teacher::TeacherSettings;
-use learn::exploration::ExplorationConfig;
-use learn::reward::RewardConfig;
+use learn::exploration::{BonusConfig, ExplorationConfig};
+use learn::reward::{DenoisingConfig, RewardConfig, SemiSupervisedConfig, SteeringConfig};
 use learn::sac::SacConfig;
 use learn::temporal::TemporalConfig;
 
@@ -38,6 +38,14 @@ pub struct RunConfig {
     pub exploration: ExplorationConfig,
     /// The reward ensemble.
     pub reward: RewardConfig,
+    /// RUNE's bonus.
+    pub bonus: BonusConfig,
+    /// MRN's outer steps.
+    pub steering: SteeringConfig,
+    /// RIME's way of fitting.
+    pub denoising: DenoisingConfig,
+    /// SURF's way of fitting.
+    pub semi_supervised: SemiSupervisedConfig,
     /// The temporal distance.
     pub temporal: TemporalConfig,
     /// What is asked.
@@ -62,6 +70,10 @@ impl Default for RunConfig {
             agent: SacConfig::default(),
             exploration: ExplorationConfig::default(),
             reward: RewardConfig::default(),
+            bonus: BonusConfig::default(),
+            steering: SteeringConfig::default(),
+            denoising: DenoisingConfig::default(),
+            semi_supervised: SemiSupervisedConfig::default(),
             temporal: TemporalConfig::default(),
             queries: QueriesConfig::default(),
             feedback: FeedbackSchedule::default(),
@@ -303,6 +315,36 @@ pub const PRESETS: &[(&str, &str, &str)] = &[
         include_str!("../../../assets/presets/method/timestep.toml"),
     ),
     (
+        "rune",
+        "",
+        include_str!("../../../assets/presets/method/rune.toml"),
+    ),
+    (
+        "mrn",
+        "",
+        include_str!("../../../assets/presets/method/mrn.toml"),
+    ),
+    (
+        "rime",
+        "",
+        include_str!("../../../assets/presets/method/rime.toml"),
+    ),
+    (
+        "qpa",
+        "",
+        include_str!("../../../assets/presets/method/qpa.toml"),
+    ),
+    (
+        "surf",
+        "",
+        include_str!("../../../assets/presets/method/surf.toml"),
+    ),
+    (
+        "surf_whole",
+        "",
+        include_str!("../../../assets/presets/method/surf_whole.toml"),
+    ),
+    (
         "task",
         "go-fetch-return",
         include_str!("../../../assets/presets/task/go-fetch-return.toml"),
@@ -311,6 +353,11 @@ pub const PRESETS: &[(&str, &str, &str)] = &[
         "task",
         "window-open",
         include_str!("../../../assets/presets/task/window-open.toml"),
+    ),
+    (
+        "paper_table",
+        "",
+        include_str!("../../../assets/presets/paper_table.toml"),
     ),
     (
         "quick",
@@ -468,6 +515,7 @@ impl RunConfig {
             return Err(unknown("sampler", &q.sampler, known));
         }
         self.check_teacher()?;
+        self.check_methods()?;
         if q.newest_episodes == 0 {
             return out("queries.newest_episodes", "0".into(), "at least 1");
         }
@@ -486,6 +534,51 @@ impl RunConfig {
 }
 
 impl RunConfig {
+    /// What single methods read.
+    fn check_methods(&self) -> Result<(), ConfigError> {
+        let (b, d, s) = (&self.bonus, &self.denoising, &self.semi_supervised);
+        let shares = [
+            ("bonus.decay", b.decay, 0.0..1.0),
+            ("denoising.flip_below", d.flip_below, 1e-12..0.5),
+            ("semi_supervised.certainty", s.certainty, 0.5..1.0),
+        ];
+        for (key, value, range) in shares {
+            if !range.contains(&value) {
+                return Err(ConfigError::OutOfRange {
+                    key,
+                    value: value.to_string(),
+                    must_be: "a share: bonus.decay in [0, 1), flip_below in (0, 0.5), \
+                              certainty in [0.5, 1)",
+                });
+            }
+        }
+        let weights = [
+            ("bonus.initial", b.initial),
+            ("steering.weight", self.steering.weight),
+            ("denoising.slack", d.slack),
+            ("denoising.doubt", d.doubt),
+            ("denoising.least_doubt", d.least_doubt),
+            ("semi_supervised.weight", s.weight),
+        ];
+        for (key, value) in weights {
+            if !(value >= 0.0 && value.is_finite()) {
+                return Err(ConfigError::OutOfRange {
+                    key,
+                    value: value.to_string(),
+                    must_be: "a number from 0 on",
+                });
+            }
+        }
+        if s.passes == 0 {
+            return Err(ConfigError::OutOfRange {
+                key: "semi_supervised.passes",
+                value: "0".into(),
+                must_be: "at least 1",
+            });
+        }
+        Ok(())
+    }
+
     fn check_teacher(&self) -> Result<(), ConfigError> {
         let t = &self.teacher;
         let shares = [
@@ -699,6 +792,10 @@ mod tests {
             "queries.near_policy_episodes=0",
             "teacher.mistake=1.5",
             "teacher.discount=0.0",
+            "bonus.decay=1.0",
+            "denoising.flip_below=0.0",
+            "semi_supervised.certainty=0.2",
+            "semi_supervised.passes=0",
             "seed=many",
             "seed",
             "feedback.every=0",

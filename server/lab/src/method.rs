@@ -1,15 +1,22 @@
 //! Methods as recipes of parts. The table of baselines is this folder.
 
 use domain::sampler::{QuerySampler, SAMPLERS, sampler};
+use learn::exploration::BonusConfig;
 use learn::replay::RewardSource;
+use learn::reward::{RewardLearner, SteeringConfig};
 use learn::stage::StageApproximator;
 
 use crate::config::{ConfigError, RunConfig, unknown};
 
+mod mrn;
 mod pebble;
+mod qpa;
+mod rime;
+mod rune;
 mod sac;
 mod stair;
 mod stair_isr;
+mod surf;
 mod timestep;
 mod uniform;
 
@@ -21,6 +28,15 @@ pub struct Method {
     pub reward: RewardSource,
     /// What the stage gap is, for methods that have one.
     pub stage: Option<StageApproximator>,
+    /// How the reward ensemble is fitted.
+    pub reward_learner: fn(&RunConfig) -> Box<dyn RewardLearner>,
+    /// What is added to the learned reward where the ensemble disagrees about it.
+    pub bonus: Option<BonusConfig>,
+    /// Newest episodes' worth of steps from which half of each batch comes while answers are
+    /// still to be had.
+    pub recent_episodes: Option<usize>,
+    /// Whether and how the rewards are moved by what the critics make of them.
+    pub steering: Option<SteeringConfig>,
 }
 
 impl Method {
@@ -69,6 +85,36 @@ pub const METHODS: &[MethodEntry] = &[
         name: "uniform",
         summary: "asks about random pairs",
         build: uniform::uniform,
+    },
+    MethodEntry {
+        name: "rune",
+        summary: "PEBBLE, drawn to where the rewards are in doubt",
+        build: rune::rune,
+    },
+    MethodEntry {
+        name: "mrn",
+        summary: "PEBBLE, its rewards steered by the critics",
+        build: mrn::mrn,
+    },
+    MethodEntry {
+        name: "rime",
+        summary: "PEBBLE that leaves doubtful answers out",
+        build: rime::rime,
+    },
+    MethodEntry {
+        name: "qpa",
+        summary: "asks about and learns from what the policy does now",
+        build: qpa::qpa,
+    },
+    MethodEntry {
+        name: "surf",
+        summary: "PEBBLE that also learns from unanswered pairs and crops",
+        build: surf::surf,
+    },
+    MethodEntry {
+        name: "surf_whole",
+        summary: "SURF without crops",
+        build: surf::surf_whole,
     },
     MethodEntry {
         name: "stair_isr",

@@ -4,6 +4,8 @@
     reason = "a story that cannot go on fails where it stands"
 )]
 
+mod methods;
+
 use std::path::PathBuf;
 use std::sync::mpsc::channel;
 
@@ -32,6 +34,10 @@ impl Drop for Folder {
 
 /// A few seconds of everything: exploring, two sessions, temporal distance, evaluation.
 fn short() -> RunConfig {
+    short_of("stair", &[])
+}
+
+fn short_of(method: &str, more: &[&str]) -> RunConfig {
     let settings = [
         "training.total_steps=1200",
         "training.seed_steps=200",
@@ -50,7 +56,7 @@ fn short() -> RunConfig {
         "temporal.batch=32",
         "environment.n_envs=2",
     ];
-    resolve("stair", &[], &settings)
+    resolve(method, &[], &[&settings, more].concat())
 }
 
 fn resolve(method: &str, presets: &[&str], settings: &[&str]) -> RunConfig {
@@ -86,12 +92,10 @@ fn uninterrupted(config: &RunConfig, name: &str) -> lab::message::Finished {
     finished(drive(&mut run, &mut Scripted::new(Box::new(Oracle), 0)).0)
 }
 
-#[test]
-fn a_run_stopped_again_and_again_ends_with_the_same_bits() {
-    let config = short();
-    let expected = uninterrupted(&config, "straight");
-    let folder = Folder::new("stopped");
-    drop(Run::start(config, &folder.0).unwrap());
+/// The same run, stopped again and again and taken up from its folder each time.
+fn interrupted(config: &RunConfig, name: &str) -> lab::message::Finished {
+    let folder = Folder::new(name);
+    drop(Run::start(config.clone(), &folder.0).unwrap());
     for n_events in [3, 1, 7, 2, 5, 11, usize::MAX] {
         let (mut run, complaints) = Run::resume(&folder.0).unwrap();
         assert!(complaints.is_empty(), "{complaints:?}");
@@ -105,11 +109,17 @@ fn a_run_stopped_again_and_again_ends_with_the_same_bits() {
             }
         };
         if let Outcome::Finished(actual) = run.drive(&mut teacher, &commands, stop_later).unwrap() {
-            assert_eq!(actual.weights, expected.weights);
-            return;
+            return actual;
         }
     }
     panic!("the run did not finish");
+}
+
+#[test]
+fn a_run_stopped_again_and_again_ends_with_the_same_bits() {
+    let config = short();
+    let expected = uninterrupted(&config, "straight");
+    assert_eq!(interrupted(&config, "stopped").weights, expected.weights);
 }
 
 #[test]

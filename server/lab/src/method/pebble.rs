@@ -2,6 +2,7 @@
 
 use domain::sampler::Disagreement;
 use learn::replay::RewardSource;
+use learn::reward::Supervised;
 
 use super::Method;
 use crate::config::RunConfig;
@@ -12,5 +13,9 @@ pub(crate) fn pebble(_config: &RunConfig) -> Method {
         sampler: Some(Box::new(Disagreement)),
         reward: RewardSource::Learned,
         stage: None,
+        reward_learner: |_| Box::new(Supervised),
+        bonus: None,
+        recent_episodes: None,
+        steering: None,
     }
 }
