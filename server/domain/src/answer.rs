@@ -91,6 +91,15 @@ pub enum Preference {
 }
 
 impl Preference {
+    /// The opposite; equal stays equal.
+    #[must_use]
+    pub fn flipped(self) -> Self {
+        match self {
+            Self::Prefer(which) => Self::Prefer(which.other()),
+            Self::Equal => Self::Equal,
+        }
+    }
+
     /// Target of P(second ≻ first): 0, 1 or ½.
     pub fn target(self) -> f32 {
         match self {

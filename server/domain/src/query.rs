@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::environment::TaskReward;
 use crate::episode::{Segment, SegmentRecord};
 
 /// Two segments to compare. Which one is shown on the left is decided where it is shown.
@@ -47,6 +48,9 @@ pub struct OfferedQuery {
     pub disagreement: Option<f32>,
     /// Stage gap in nats when it was chosen, where beliefs were asked.
     pub stage_gap: Option<f32>,
+    /// Mean task reward of a step over the ten newest complete episodes, where known: what
+    /// scripted teachers measure their thresholds by.
+    pub typical_reward: Option<TaskReward>,
 }
 
 impl OfferedQuery {

@@ -37,6 +37,14 @@ pub enum Stream {
     Side = 14,
     /// Statistics by resampling.
     Bootstrap = 15,
+    /// Order, crops and unanswered pairs of semi-supervised fitting.
+    SemiSupervised = 16,
+    /// Noise of the policy inside a step that steers the rewards.
+    Steering = 17,
+    /// Rows on which the reward ensemble is warm-started.
+    WarmStart = 18,
+    /// Pairs that nobody is asked about.
+    Unlabeled = 19,
     /// Tests.
     Test = 99,
 }

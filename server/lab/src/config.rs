@@ -5,10 +5,11 @@
 use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
 
-use domain::sampler::StageCoefficients;
+use domain::sampler::{SAMPLERS, SamplerSettings, StageCoefficients, sampler};
 use domain::schedule::FeedbackSchedule;
-use learn::exploration::ExplorationConfig;
-use learn::reward::RewardConfig;
+use domain::teacher::TeacherSettings;
+use learn::exploration::{BonusConfig, ExplorationConfig};
+use learn::reward::{DenoisingConfig, RewardConfig, SemiSupervisedConfig, SteeringConfig};
 use learn::sac::SacConfig;
 use learn::temporal::TemporalConfig;
 
@@ -37,12 +38,22 @@ pub struct RunConfig {
     pub exploration: ExplorationConfig,
     /// The reward ensemble.
     pub reward: RewardConfig,
+    /// RUNE's bonus.
+    pub bonus: BonusConfig,
+    /// MRN's outer steps.
+    pub steering: SteeringConfig,
+    /// RIME's way of fitting.
+    pub denoising: DenoisingConfig,
+    /// SURF's way of fitting.
+    pub semi_supervised: SemiSupervisedConfig,
     /// The temporal distance.
     pub temporal: TemporalConfig,
     /// What is asked.
     pub queries: QueriesConfig,
     /// When it is asked.
     pub feedback: FeedbackSchedule,
+    /// How irregular scripted teachers are.
+    pub teacher: TeacherSettings,
     /// How the policy is tried.
     pub evaluation: EvaluationConfig,
 }
@@ -59,9 +70,14 @@ impl Default for RunConfig {
             agent: SacConfig::default(),
             exploration: ExplorationConfig::default(),
             reward: RewardConfig::default(),
+            bonus: BonusConfig::default(),
+            steering: SteeringConfig::default(),
+            denoising: DenoisingConfig::default(),
+            semi_supervised: SemiSupervisedConfig::default(),
             temporal: TemporalConfig::default(),
             queries: QueriesConfig::default(),
             feedback: FeedbackSchedule::default(),
+            teacher: TeacherSettings::default(),
             evaluation: EvaluationConfig::default(),
         }
     }
@@ -146,8 +162,18 @@ pub struct QueriesConfig {
     pub candidates_per_query: u32,
     /// Only the newest so many complete episodes are asked about; 100 in the released code.
     pub newest_episodes: usize,
+    /// A name of [`SAMPLERS`]; empty takes the method's own.
+    pub sampler: String,
     /// c_stage and c_state of STAIR's score.
     pub coefficients: StageCoefficients,
+    /// Whether the stage gap is the mean of both directions; the paper's is one way.
+    pub symmetric_gap: bool,
+    /// Newest complete episodes that count as near the policy, QPA's N: 10 in its released
+    /// settings, 60 for door-open, 30 for door-unlock and drawer-open.
+    pub near_policy_episodes: usize,
+    /// Whether segments never take an episode's last possible start, a slip of the released
+    /// code.
+    pub bpref_starts: bool,
     /// Share of queries that also ask whether both segments show the same stage, [0, 1].
     pub same_stage_fraction: f64,
     /// Whether indistinguishable answers train towards (½, ½) or are dropped.
@@ -163,10 +189,24 @@ impl Default for QueriesConfig {
             segment_len: 0,
             candidates_per_query: 10,
             newest_episodes: 100,
+            sampler: String::new(),
             coefficients: StageCoefficients::default(),
+            symmetric_gap: false,
+            near_policy_episodes: 10,
+            bpref_starts: false,
             same_stage_fraction: 0.0,
             train_on_equal: true,
             sufficient_fraction: 1.0,
+        }
+    }
+}
+
+impl QueriesConfig {
+    /// What a sampler is made with.
+    pub fn sampler_settings(&self) -> SamplerSettings {
+        SamplerSettings {
+            coefficients: self.coefficients,
+            near_policy_episodes: self.near_policy_episodes,
         }
     }
 }
@@ -270,6 +310,46 @@ pub const PRESETS: &[(&str, &str, &str)] = &[
         include_str!("../../../assets/presets/method/stair.toml"),
     ),
     (
+        "stair_isr",
+        "",
+        include_str!("../../../assets/presets/method/stair_isr.toml"),
+    ),
+    (
+        "timestep",
+        "",
+        include_str!("../../../assets/presets/method/timestep.toml"),
+    ),
+    (
+        "rune",
+        "",
+        include_str!("../../../assets/presets/method/rune.toml"),
+    ),
+    (
+        "mrn",
+        "",
+        include_str!("../../../assets/presets/method/mrn.toml"),
+    ),
+    (
+        "rime",
+        "",
+        include_str!("../../../assets/presets/method/rime.toml"),
+    ),
+    (
+        "qpa",
+        "",
+        include_str!("../../../assets/presets/method/qpa.toml"),
+    ),
+    (
+        "surf",
+        "",
+        include_str!("../../../assets/presets/method/surf.toml"),
+    ),
+    (
+        "surf_whole",
+        "",
+        include_str!("../../../assets/presets/method/surf_whole.toml"),
+    ),
+    (
         "task",
         "door-open",
         include_str!("../../../assets/presets/task/door-open.toml"),
@@ -353,6 +433,11 @@ pub const PRESETS: &[(&str, &str, &str)] = &[
         "quick",
         "faucet-open",
         include_str!("../../../assets/presets/quick/faucet-open.toml"),
+    ),
+    (
+        "paper_table",
+        "",
+        include_str!("../../../assets/presets/paper_table.toml"),
     ),
     (
         "quick",
@@ -564,6 +649,15 @@ impl RunConfig {
         if q.candidates_per_query == 0 {
             return out("queries.candidates_per_query", "0".into(), "at least 1");
         }
+        if q.near_policy_episodes == 0 {
+            return out("queries.near_policy_episodes", "0".into(), "at least 1");
+        }
+        if !q.sampler.is_empty() && sampler(&q.sampler, &q.sampler_settings()).is_none() {
+            let known = SAMPLERS.iter().map(|(name, _)| *name);
+            return Err(unknown("sampler", &q.sampler, known));
+        }
+        self.check_teacher()?;
+        self.check_methods()?;
         if q.newest_episodes == 0 {
             return out("queries.newest_episodes", "0".into(), "at least 1");
         }
@@ -623,6 +717,82 @@ impl RunConfig {
                 self.temporal.latent.to_string(),
                 "from 1 to 65536",
             );
+        }
+        Ok(())
+    }
+}
+
+impl RunConfig {
+    /// What single methods read.
+    fn check_methods(&self) -> Result<(), ConfigError> {
+        let (b, d, s) = (&self.bonus, &self.denoising, &self.semi_supervised);
+        let shares = [
+            ("bonus.decay", b.decay, 0.0..1.0),
+            ("denoising.flip_below", d.flip_below, 1e-12..0.5),
+            ("semi_supervised.certainty", s.certainty, 0.5..1.0),
+        ];
+        for (key, value, range) in shares {
+            if !range.contains(&value) {
+                return Err(ConfigError::OutOfRange {
+                    key,
+                    value: value.to_string(),
+                    must_be: "a share: bonus.decay in [0, 1), flip_below in (0, 0.5), \
+                              certainty in [0.5, 1)",
+                });
+            }
+        }
+        let weights = [
+            ("bonus.initial", b.initial),
+            ("steering.weight", self.steering.weight),
+            ("denoising.slack", d.slack),
+            ("denoising.doubt", d.doubt),
+            ("denoising.least_doubt", d.least_doubt),
+            ("semi_supervised.weight", s.weight),
+        ];
+        for (key, value) in weights {
+            if !(value >= 0.0 && value.is_finite()) {
+                return Err(ConfigError::OutOfRange {
+                    key,
+                    value: value.to_string(),
+                    must_be: "a number from 0 on",
+                });
+            }
+        }
+        if s.passes == 0 {
+            return Err(ConfigError::OutOfRange {
+                key: "semi_supervised.passes",
+                value: "0".into(),
+                must_be: "at least 1",
+            });
+        }
+        Ok(())
+    }
+
+    fn check_teacher(&self) -> Result<(), ConfigError> {
+        let t = &self.teacher;
+        let shares = [
+            ("teacher.mistake", t.mistake),
+            ("teacher.inconsistent_mistake", t.inconsistent_mistake),
+            ("teacher.equal", t.equal),
+            ("teacher.skip", t.skip),
+        ];
+        let out = |key, value: f64, must_be| {
+            Err(ConfigError::OutOfRange {
+                key,
+                value: value.to_string(),
+                must_be,
+            })
+        };
+        for (key, value) in shares {
+            if !(0.0..=1.0).contains(&value) {
+                return out(key, value, "from 0 to 1");
+            }
+        }
+        if !(t.discount > 0.0 && t.discount <= 1.0) {
+            return out("teacher.discount", t.discount, "above 0, at most 1");
+        }
+        if !(t.rationality > 0.0 && t.rationality.is_finite()) {
+            return out("teacher.rationality", t.rationality, "a number above 0");
         }
         Ok(())
     }
@@ -807,6 +977,14 @@ mod tests {
         for bad in [
             "environment.n_envs=0",
             "queries.same_stage_fraction=1.5",
+            "queries.sampler=disagrement",
+            "queries.near_policy_episodes=0",
+            "teacher.mistake=1.5",
+            "teacher.discount=0.0",
+            "bonus.decay=1.0",
+            "denoising.flip_below=0.0",
+            "semi_supervised.certainty=0.2",
+            "semi_supervised.passes=0",
             "seed=many",
             "seed",
             "feedback.every=0",

@@ -3,6 +3,7 @@
 use domain::environment::{EnvError, EnvSpec, Environment, Step};
 use domain::random::{Rng, Stream};
 use learn::replay::{NewStep, Replay};
+use learn::reward::Estimate;
 use serde::{Deserialize, Serialize};
 
 /// Environments and the states they are in.
@@ -103,7 +104,7 @@ impl Lanes {
     pub(crate) fn store(
         &mut self,
         actions: &[f32],
-        learned_rewards: &[f32],
+        learned: &Estimate,
         steps: &[Step],
         replay: &mut Replay,
     ) {
@@ -113,7 +114,7 @@ impl Lanes {
                 lane,
                 NewStep {
                     action: &actions[lane * self.action_size..][..self.action_size],
-                    learned_reward: learned_rewards[lane],
+                    learned_reward: learned.rewards[lane],
                     task_reward: step.task_reward,
                     success: step.success,
                     stage: step.stage,
@@ -122,6 +123,9 @@ impl Lanes {
                     next_pose: &pose,
                 },
             );
+            if replay.keeps_disagreement() {
+                replay.note_disagreement(lane, learned.disagreements[lane]);
+            }
             self.observations[lane * self.observation_size..][..self.observation_size]
                 .copy_from_slice(&step.observation);
             if step.end.is_some() {

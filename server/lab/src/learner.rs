@@ -1,13 +1,14 @@
 //! The parts that learn, and how their work is spread over two threads.
 
 use domain::environment::EnvSpec;
+use domain::query::Query;
 use domain::random::{Rng, Stream};
 use learn::LearnError;
 use learn::checkpoint::Archive;
 use learn::device::Device;
 use learn::exploration::StateEntropy;
-use learn::replay::{Replay, RewardSource};
-use learn::reward::RewardEnsemble;
+use learn::replay::{BatchRule, Replay, RewardSource};
+use learn::reward::{Labeled, Lesson, RewardEnsemble, RewardFit, RewardLearner, SteeringConfig};
 use learn::sac::{Act, Sac, SacMetrics};
 use learn::temporal::{TemporalDistance, TemporalMetrics};
 
@@ -20,6 +21,7 @@ pub(crate) struct Learner {
     pub reward: RewardEnsemble,
     /// Learned where the method asks for it.
     pub temporal: Option<TemporalDistance>,
+    fitting: Box<dyn RewardLearner>,
     agent: Sac,
     exploration: StateEntropy,
     batch: usize,
@@ -35,7 +37,7 @@ pub(crate) struct Due {
     /// Whether they train on novelty instead of reward.
     pub is_exploring: bool,
     /// What they train on otherwise.
-    pub reward: RewardSource,
+    pub batches: BatchRule,
     /// Steps of the temporal distance.
     pub n_temporal: u64,
 }
@@ -56,8 +58,9 @@ impl Learner {
         Self {
             reward: RewardEnsemble::new(&config.reward, s, a, seed, device),
             temporal: method
-                .learns_temporal_distance
+                .learns_temporal_distance()
                 .then(|| TemporalDistance::new(&config.temporal, s, seed, device)),
+            fitting: (method.reward_learner)(config),
             agent: Sac::new(&config.agent, s, a, seed, device),
             exploration: StateEntropy::new(&config.exploration),
             batch: config.agent.batch,
@@ -75,6 +78,7 @@ impl Learner {
         replay: &Replay,
         simulate: impl FnOnce(&RewardEnsemble) -> (S, R),
     ) -> (Updates, S, R) {
+        let n_updates_before = self.agent.n_updates();
         let Self {
             reward,
             temporal,
@@ -83,6 +87,7 @@ impl Learner {
             batch,
             task_reward_scale,
             seed,
+            ..
         } = self;
         let (batch, scale, seed) = (*batch, *task_reward_scale, *seed);
         let update_agent = || -> Vec<SacMetrics> {
@@ -90,21 +95,17 @@ impl Learner {
             (0..due.n_updates)
                 .map(|_| {
                     let mut rng = Rng::new(seed, Stream::Batch, agent.n_updates());
+                    let mut sample = replay.draw(batch, &mut rng, &due.batches);
                     if due.is_exploring {
-                        let mut sample = replay.sample(batch, &mut rng);
                         sample.reward = exploration.intrinsic(&sample.observation, replay);
-                        agent.update(&sample)
-                    } else {
-                        let mut sample = replay.sample_with(batch, &mut rng, due.reward);
-                        if due.reward == RewardSource::Task {
-                            sample.reward.iter_mut().for_each(|r| *r *= scale);
-                        }
-                        agent.update(&sample)
+                    } else if due.batches.reward == RewardSource::Task {
+                        sample.reward.iter_mut().for_each(|r| *r *= scale);
                     }
+                    agent.update(&sample)
                 })
                 .collect()
         };
-        std::thread::scope(|scope| {
+        let (updates, steps, rewards) = std::thread::scope(|scope| {
             let updating = (due.n_updates > 0).then(|| scope.spawn(update_agent));
             let (steps, rewards) = simulate(reward);
             let temporal = match temporal {
@@ -118,25 +119,87 @@ impl Learner {
                     .join()
                     .unwrap_or_else(|panic| std::panic::resume_unwind(panic))
             });
-            (
-                Updates {
-                    agent: agent.unwrap_or_default(),
-                    temporal,
-                },
-                steps,
-                rewards,
-            )
-        })
+            let updates = Updates {
+                agent: agent.unwrap_or_default(),
+                temporal,
+            };
+            (updates, steps, rewards)
+        });
+        if due.is_exploring {
+            self.warm_start(n_updates_before, replay);
+        }
+        (updates, steps, rewards)
+    }
+
+    /// Brings the reward towards novelty beside the exploring updates since `from`, for methods
+    /// that start with one.
+    fn warm_start(&mut self, from: u64, replay: &Replay) {
+        let n_steps = u64::from(self.fitting.warm_start_steps());
+        for step in from * n_steps..self.agent.n_updates() * n_steps {
+            let mut rng = Rng::new(self.seed, Stream::WarmStart, step);
+            let sample = replay.sample(self.batch, &mut rng);
+            let targets = self.exploration.warm_targets(&sample.observation, replay);
+            self.reward
+                .regress(&sample.observation, &sample.action, &targets);
+        }
+    }
+
+    /// Fits the reward to all answers in the method's way.
+    pub(crate) fn fit_reward(
+        &mut self,
+        replay: &Replay,
+        labeled: &[Labeled],
+        unlabeled: &[Query],
+    ) -> RewardFit {
+        let lesson = Lesson {
+            replay,
+            labeled,
+            unlabeled,
+        };
+        self.fitting.fit(&mut self.reward, &lesson)
+    }
+
+    /// Pairs beside the asked ones that a fit wants, for each query of a session.
+    pub(crate) fn unlabeled_per_query(&self) -> u32 {
+        self.fitting.unlabeled_per_query()
+    }
+
+    /// In place of one SAC update: moves the rewards so that critics which learn from them agree
+    /// with the latest answers, updates the agent on them, and relabels.
+    pub(crate) fn steer(
+        &mut self,
+        steering: &SteeringConfig,
+        latest: &[Labeled],
+        replay: &mut Replay,
+    ) -> SacMetrics {
+        let rule = BatchRule {
+            ends_at_time_limit: true,
+            ..BatchRule::default()
+        };
+        let mut rng = Rng::new(self.seed, Stream::Batch, self.agent.n_updates());
+        let mut batch = replay.draw(self.batch, &mut rng, &rule);
+        self.reward
+            .steer(&self.agent, replay, &batch, latest, steering.weight);
+        batch.reward = self.reward.predict(&batch.observation, &batch.action);
+        let metrics = self.agent.update(&batch);
+        self.reward.relabel(replay);
+        metrics
     }
 
     /// The end of pre-training: a fresh critic on relabelled experience, and a head start.
-    pub(crate) fn begin_preference_learning(&mut self, config: &RunConfig, replay: &Replay) {
+    pub(crate) fn begin_preference_learning(
+        &mut self,
+        config: &RunConfig,
+        replay: &Replay,
+        batches: &BatchRule,
+    ) {
         if config.training.reset_critic {
             self.agent.reset_critic();
         }
         for _ in 0..config.training.updates_after_reset {
             let mut rng = Rng::new(self.seed, Stream::Batch, self.agent.n_updates());
-            self.agent.update(&replay.sample(self.batch, &mut rng));
+            self.agent
+                .update(&replay.draw(self.batch, &mut rng, batches));
         }
     }
 
@@ -159,6 +222,7 @@ impl Learner {
     pub(crate) fn save(&self, archive: &mut Archive) {
         self.agent.save(archive);
         self.reward.save(archive);
+        self.fitting.save(archive);
         self.exploration.save(archive);
         if let Some(temporal) = &self.temporal {
             temporal.save(archive);
@@ -172,6 +236,7 @@ impl Learner {
     pub(crate) fn load(&mut self, archive: &Archive) -> Result<(), LearnError> {
         self.agent.load(archive)?;
         self.reward.load(archive)?;
+        self.fitting.load(archive)?;
         self.exploration.load(archive)?;
         if let Some(temporal) = &mut self.temporal {
             temporal.load(archive)?;

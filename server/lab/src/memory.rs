@@ -60,7 +60,7 @@ impl MemoryNeed {
             replay: step_bytes(spec).saturating_mul(config.training.total_steps),
             agent: config.agent.bytes(s, a),
             reward: config.reward.bytes(s, a),
-            temporal: if method.learns_temporal_distance {
+            temporal: if method.learns_temporal_distance() {
                 config.temporal.bytes(s)
             } else {
                 0

@@ -73,6 +73,11 @@ impl Preferences {
         self.0.get(&key).map(|a| a.state)
     }
 
+    /// All queries so far.
+    pub(crate) fn asked(&self) -> Vec<Query> {
+        self.0.values().map(|a| a.query).collect()
+    }
+
     /// Preferences so far: what the budget counts.
     pub(crate) fn n_preferred(&self) -> u32 {
         self.0

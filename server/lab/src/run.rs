@@ -5,6 +5,7 @@ use std::sync::mpsc::{Receiver, TryRecvError};
 use std::time::Duration;
 
 use domain::environment::{EnvError, EnvSpec};
+use domain::query::Query;
 use domain::random::{Rng, Stream};
 use domain::sampler::{QuerySampler, Uniform};
 use domain::schedule::Every;
@@ -13,10 +14,11 @@ use learn::LearnError;
 use learn::beliefs::LearnedBeliefs;
 use learn::checkpoint::Archive;
 use learn::device::Device;
-use learn::replay::{Replay, ReplayMark};
+use learn::replay::{BatchRule, Replay, ReplayMark};
+use learn::reward::{Estimate, Labeled, SteeringConfig};
 use serde::{Deserialize, Serialize};
 
-use crate::candidates;
+use crate::candidates::Pool;
 use crate::config::{ConfigError, RunConfig, WhileWaiting, find_task};
 use crate::evaluate::{Trial, correlation, evaluate};
 use crate::folder::RunFolder;
@@ -34,6 +36,9 @@ use crate::session::{Selection, Session};
 
 /// How long the loop rests when there is nothing to do but wait for people.
 const REST: Duration = Duration::from_millis(20);
+
+/// Newest episodes by which scripted teachers measure, as in B-Pref.
+const TYPICAL_EPISODES: usize = 10;
 
 /// Held-out episodes are the same for every run, so that runs can be compared.
 const HELD_OUT: u64 = 0;
@@ -141,13 +146,16 @@ impl Run {
     pub fn start(config: RunConfig, folder: &Path) -> Result<Self, RunError> {
         let task = find_task(&config.task)?;
         let spec = (task.spec)();
-        let method = (method::find(&config.method)?.build)(&config);
+        let method = method::build(&config)?;
         let device = Device::open(&config.device)?;
         if let Some(bytes) = memory::available() {
             MemoryNeed::of(&config, &spec, &method).check(&spec, bytes)?;
         }
         let learner = Learner::new(&config, &spec, &method, device);
         let mut replay = Replay::new(shape(&spec), config.environment.n_envs);
+        if method.bonus.is_some() {
+            replay.keep_disagreement();
+        }
         let lanes = Lanes::start(task, config.environment.n_envs, config.seed, &mut replay);
         let folder = RunFolder::create(folder)?;
         let mut run = Self {
@@ -236,17 +244,20 @@ impl Run {
         }
         let task = find_task(&config.task)?;
         let spec = (task.spec)();
-        let method = (method::find(&config.method)?.build)(&config);
+        let method = method::build(&config)?;
         let mut learner = Learner::new(&config, &spec, &method, Device::open(&config.device)?);
         learner.load(&archive)?;
         let lanes = Lanes::restore(task, config.seed, archive.json::<LanesState>("lanes")?)?;
         let mark: ReplayMark = archive.json("replay")?;
-        let replay = Replay::open(
+        let mut replay = Replay::open(
             &folder.replay(),
             shape(&spec),
             config.environment.n_envs,
             &mark,
         )?;
+        if method.bonus.is_some() {
+            replay.keep_disagreement(); // an empty column says nothing about itself
+        }
         folder.cut_metrics(archive.json("metrics_len")?)?;
         Ok(Self {
             preferences: archive.json("preferences")?,
@@ -400,14 +411,8 @@ impl Run {
         let queries = &self.config.queries;
         let mut rng = Rng::new(self.config.seed, Stream::Candidates, u64::from(index));
         let n_candidates = (size * queries.candidates_per_query) as usize;
-        let segment_len = self.config.segment_len(&self.spec);
-        let candidates = candidates::draw(
-            &self.replay,
-            queries.newest_episodes,
-            segment_len,
-            n_candidates,
-            &mut rng,
-        );
+        let candidates = self.pool().draw(&self.replay, n_candidates, &mut rng);
+        let asked = self.preferences.asked();
         let sampler: &dyn QuerySampler = match &self.method.sampler {
             Some(sampler) if self.progress.n_fits > 0 => sampler.as_ref(),
             _ => &Uniform, // nothing is believed before the first fit
@@ -416,6 +421,8 @@ impl Run {
             replay: &self.replay,
             reward: &self.learner.reward,
             temporal: self.learner.temporal.as_ref(),
+            stage: self.method.stage,
+            asked: &asked,
         };
         let selection = Selection {
             index,
@@ -423,6 +430,7 @@ impl Run {
             seed: self.config.seed,
             same_stage_fraction: queries.same_stage_fraction,
             candidates: &candidates,
+            typical_reward: self.replay.typical_reward(TYPICAL_EPISODES),
         };
         let session = Session::choose(&selection, sampler, &mut beliefs);
         let report = session.report(self.progress.step, &candidates, &mut beliefs, &self.replay);
@@ -436,6 +444,26 @@ impl Run {
         self.offer_open_queries(teacher)
     }
 
+    /// Where queries may come from.
+    fn pool(&self) -> Pool {
+        let queries = &self.config.queries;
+        let own = self.method.sampler.as_ref();
+        let newest_episodes = own.and_then(|sampler| sampler.newest_episodes());
+        Pool {
+            newest_episodes: newest_episodes.unwrap_or(queries.newest_episodes),
+            segment_len: self.config.segment_len(&self.spec),
+            leaves_last_start: queries.bpref_starts,
+        }
+    }
+
+    /// Pairs that nobody is asked about, for methods that learn from them too.
+    fn unlabeled(&self, session: u32) -> Vec<Query> {
+        let per_query = self.learner.unlabeled_per_query();
+        let n = per_query * self.config.feedback.queries_per_session;
+        let mut rng = Rng::new(self.config.seed, Stream::Unlabeled, u64::from(session));
+        self.pool().draw(&self.replay, n as usize, &mut rng)
+    }
+
     /// Fits the reward to all answers and relabels the replay.
     fn learn_from_session(&mut self, events: &mut dyn FnMut(Event)) -> Result<(), RunError> {
         let Some(session) = self.session.take() else {
@@ -444,11 +472,13 @@ impl Run {
         let labeled = self.preferences.labeled(self.config.queries.train_on_equal);
         let is_first = self.progress.n_fits == 0;
         self.progress.n_fits += 1;
-        let fit = self.learner.reward.fit(&self.replay, &labeled);
+        let unlabeled = self.unlabeled(session.index());
+        let fit = self.learner.fit_reward(&self.replay, &labeled, &unlabeled);
         self.learner.reward.relabel(&mut self.replay);
         if is_first {
+            let batches = self.batches(self.progress.step);
             self.learner
-                .begin_preference_learning(&self.config, &self.replay);
+                .begin_preference_learning(&self.config, &self.replay, &batches);
         }
         let closed = SessionClosed {
             session: session.index(),
@@ -466,23 +496,30 @@ impl Run {
         let before = self.progress.step;
         let now = before + self.lanes.len() as u64;
         let actions = self.actions(before);
-        let due = self.due(before, now);
+        let mut due = self.due(before, now);
+        let steering = self.steering(before, now);
+        due.n_updates = due.n_updates.saturating_sub(u64::from(steering.is_some()));
         let observations = self.lanes.observations().to_vec();
         let has_reward = self.progress.n_fits > 0;
-        let (updates, steps, rewards) = self.learner.work(&due, &self.replay, |reward| {
+        let (mut updates, steps, rewards) = self.learner.work(&due, &self.replay, |reward| {
             let steps = self.lanes.step(&actions);
             let learned = if has_reward {
-                reward.predict(&observations, &actions)
+                reward.estimate(&observations, &actions)
             } else {
-                vec![0.0; self.lanes.len()]
+                Estimate::unknown(self.lanes.len())
             };
             (steps, learned)
         });
         let steps = steps?;
-        self.meter.record(&updates);
         self.lanes
             .store(&actions, &rewards, &steps, &mut self.replay);
         self.progress.step = now;
+        if let Some(steering) = steering {
+            let latest = self.latest_answers();
+            let steered = self.learner.steer(&steering, &latest, &mut self.replay);
+            updates.agent.push(steered);
+        }
+        self.meter.record(&updates);
 
         if Every(self.config.training.metrics_every).is_crossed(before, now) {
             let row = self
@@ -523,13 +560,51 @@ impl Run {
                 0
             },
             is_exploring,
-            reward: self.method.reward,
-            n_temporal: if self.method.learns_temporal_distance && self.progress.n_fits > 0 {
+            batches: if is_exploring {
+                BatchRule::default()
+            } else {
+                self.batches(before)
+            },
+            n_temporal: if self.method.learns_temporal_distance() && self.progress.n_fits > 0 {
                 Every(self.config.temporal.update_every).n_crossed(before, now)
             } else {
                 0
             },
         }
+    }
+
+    /// What SAC's batches are made of at an environment step.
+    fn batches(&self, step: u64) -> BatchRule {
+        let bonus = self.method.bonus.map_or(0.0, |bonus| bonus.weight(step));
+        let steps = |episodes| episodes * self.spec.episode_len as usize;
+        BatchRule {
+            reward: self.method.reward,
+            disagreement_weight: bonus as f32,
+            recent: self
+                .method
+                .recent_episodes
+                .map(steps)
+                .filter(|_| self.has_budget()),
+            ends_at_time_limit: false,
+        }
+    }
+
+    fn has_budget(&self) -> bool {
+        self.preferences.n_preferred() < self.config.feedback.budget
+    }
+
+    /// Whether the rewards are moved by the critics in the steps (before, now], and how.
+    fn steering(&self, before: u64, now: u64) -> Option<SteeringConfig> {
+        let is_due = |steering: &SteeringConfig| Every(steering.every).is_crossed(before, now);
+        let may = self.progress.n_fits > 0 && self.has_budget();
+        self.method.steering.filter(|s| may && is_due(s))
+    }
+
+    /// A session's worth of the newest answers.
+    fn latest_answers(&self) -> Vec<Labeled> {
+        let mut labeled = self.preferences.labeled(self.config.queries.train_on_equal);
+        let n = self.config.feedback.queries_per_session as usize;
+        labeled.split_off(labeled.len().saturating_sub(n))
     }
 
     fn evaluate(&mut self, events: &mut dyn FnMut(Event)) -> Result<(), RunError> {

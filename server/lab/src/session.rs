@@ -1,5 +1,6 @@
 //! One round of asking: what was chosen, what replaces a skipped query, when it is complete.
 
+use domain::environment::TaskReward;
 use domain::query::{OfferedQuery, Query, QueryKey};
 use domain::random::{Rng, Stream};
 use domain::sampler::{Beliefs, QuerySampler};
@@ -17,6 +18,7 @@ pub(crate) struct Planned {
     asks_same_stage: bool,
     disagreement: Option<f32>,
     stage_gap: Option<f32>,
+    typical_reward: Option<TaskReward>,
 }
 
 impl Planned {
@@ -29,6 +31,7 @@ impl Planned {
             asks_same_stage: self.asks_same_stage,
             disagreement: self.disagreement,
             stage_gap: self.stage_gap,
+            typical_reward: self.typical_reward,
         }
     }
 
@@ -66,6 +69,8 @@ pub(crate) struct Selection<'a> {
     pub same_stage_fraction: f64,
     /// Where queries are chosen from.
     pub candidates: &'a [Query],
+    /// How the agent does these days, for scripted teachers.
+    pub typical_reward: Option<TaskReward>,
 }
 
 impl Session {
@@ -81,6 +86,7 @@ impl Session {
             seed,
             same_stage_fraction,
             candidates,
+            typical_reward,
         } = *selection;
         let mut rng = Rng::new(seed, Stream::Sampler, u64::from(index));
         let order = sampler.rank(candidates, beliefs, &mut rng);
@@ -96,6 +102,7 @@ impl Session {
             asks_same_stage: rng.chance(same_stage_fraction),
             disagreement: disagreement.get(place).copied(),
             stage_gap: stage_gap.get(place).copied(),
+            typical_reward,
         };
         let mut planned: Vec<Planned> = ranked.iter().enumerate().map(plan).collect();
         let mut reserve = planned.split_off(planned.len().min(size as usize));

@@ -4,11 +4,13 @@
     reason = "a story that cannot go on fails where it stands"
 )]
 
+mod methods;
+
 use std::path::PathBuf;
 use std::sync::mpsc::channel;
 
 use domain::query::{OfferedQuery, QueryKey};
-use domain::teacher::{Answered, Oracle, Scripted, Teacher, TeacherError, judge};
+use domain::teacher::{Answered, Oracle, Scripted, Teacher, TeacherError, TeacherSettings, judge};
 use lab::config::{Layers, RunConfig};
 use lab::message::{Activity, Command, Event};
 use lab::policy::TrainedPolicy;
@@ -33,6 +35,10 @@ impl Drop for Folder {
 
 /// A few seconds of everything: exploring, two sessions, temporal distance, evaluation.
 fn short() -> RunConfig {
+    short_of("stair", &[])
+}
+
+fn short_of(method: &str, more: &[&str]) -> RunConfig {
     let settings = [
         "training.total_steps=1200",
         "training.seed_steps=200",
@@ -51,7 +57,7 @@ fn short() -> RunConfig {
         "temporal.batch=32",
         "environment.n_envs=2",
     ];
-    resolve("stair", &[], &settings)
+    resolve(method, &[], &[&settings, more].concat())
 }
 
 fn resolve(method: &str, presets: &[&str], settings: &[&str]) -> RunConfig {
@@ -87,12 +93,10 @@ fn uninterrupted(config: &RunConfig, name: &str) -> lab::message::Finished {
     finished(drive(&mut run, &mut Scripted::new(Box::new(Oracle), 0)).0)
 }
 
-#[test]
-fn a_run_stopped_again_and_again_ends_with_the_same_bits() {
-    let config = short();
-    let expected = uninterrupted(&config, "straight");
-    let folder = Folder::new("stopped");
-    drop(Run::start(config, &folder.0).unwrap());
+/// The same run, stopped again and again and taken up from its folder each time.
+fn interrupted(config: &RunConfig, name: &str) -> lab::message::Finished {
+    let folder = Folder::new(name);
+    drop(Run::start(config.clone(), &folder.0).unwrap());
     for n_events in [3, 1, 7, 2, 5, 11, usize::MAX] {
         let (mut run, complaints) = Run::resume(&folder.0).unwrap();
         assert!(complaints.is_empty(), "{complaints:?}");
@@ -106,8 +110,7 @@ fn a_run_stopped_again_and_again_ends_with_the_same_bits() {
             }
         };
         if let Outcome::Finished(actual) = run.drive(&mut teacher, &commands, stop_later).unwrap() {
-            assert_eq!(actual.weights, expected.weights);
-            return;
+            return actual;
         }
     }
     panic!("the run did not finish");
@@ -129,6 +132,13 @@ fn the_policy_that_a_finished_run_leaves_acts_as_its_checkpoint_does() {
     let checkpoints = names.filter(|path| path.to_string_lossy().contains("checkpoint-"));
     checkpoints.for_each(|path| std::fs::remove_file(path).unwrap());
     assert_eq!(act(&folder.0), of_checkpoint);
+}
+
+#[test]
+fn a_run_stopped_again_and_again_ends_with_the_same_bits() {
+    let config = short();
+    let expected = uninterrupted(&config, "straight");
+    assert_eq!(interrupted(&config, "stopped").weights, expected.weights);
 }
 
 #[test]
@@ -330,7 +340,14 @@ fn answers_teach_the_task_and_a_coin_does_not() {
         let folder = Folder::new(teacher);
         let settings = ["evaluation.every=0", "training.total_steps=28000"];
         let mut run = Run::start(resolve("stair", &["quick"], &settings), &folder.0).unwrap();
-        finished(drive(&mut run, &mut Scripted::new(judge(teacher, 1).unwrap(), 0)).0).return_mean
+        finished(
+            drive(
+                &mut run,
+                &mut Scripted::new(judge(teacher, 1, &TeacherSettings::default()).unwrap(), 0),
+            )
+            .0,
+        )
+        .return_mean
     };
     let (taught, untaught) = (task_return("oracle"), task_return("coin"));
     assert!(

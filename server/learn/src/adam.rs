@@ -28,10 +28,21 @@ impl Adam {
 
     /// One step along `scale · gradient`.
     pub(crate) fn step(&mut self, parameters: &mut Tensor, gradient: &Tensor, scale: f64) {
+        self.step_at(parameters, gradient, scale, 1.0);
+    }
+
+    /// The same with a share of the learning rate.
+    pub(crate) fn step_at(
+        &mut self,
+        parameters: &mut Tensor,
+        gradient: &Tensor,
+        scale: f64,
+        rate: f64,
+    ) {
         self.n_steps += 1;
         let n = i32::try_from(self.n_steps).unwrap_or(i32::MAX);
         let step = AdamStep {
-            rate: self.learning_rate / (1.0 - ADAM.0.powi(n)),
+            rate: rate * self.learning_rate / (1.0 - ADAM.0.powi(n)),
             root_correction: (1.0 - ADAM.1.powi(n)).sqrt(),
             scale,
         };

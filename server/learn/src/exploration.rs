@@ -16,6 +16,8 @@ pub struct ExplorationConfig {
     pub is_unsupervised: bool,
     /// Which nearest neighbour the novelty is measured to, not counting the state itself.
     pub neighbours: usize,
+    /// How novelty becomes a reward.
+    pub novelty: Novelty,
     /// Whether the running standard deviation carries the slip of all BPref forks: the mean
     /// moves by δ + n_b/n instead of δ·n_b/n, which shrinks early novelty several times.
     pub bpref_running_std: bool,
@@ -26,8 +28,55 @@ impl Default for ExplorationConfig {
         Self {
             is_unsupervised: true,
             neighbours: 5,
+            novelty: Novelty::Scaled,
             bpref_running_std: false,
         }
+    }
+}
+
+/// How the distance h to a neighbour becomes a reward; μ and σ are its running moments.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Novelty {
+    /// h/σ. PEBBLE's.
+    Scaled,
+    /// (h − μ)/3σ, cut to [−1, 1]: on the scale of learned rewards. RIME's.
+    Centred,
+}
+
+/// A bonus for steps whose reward the ensemble's members disagree about, fading with time:
+/// β₀ (1 − ρ)ᵗ. Defaults: RUNE's released settings.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct BonusConfig {
+    /// β₀.
+    pub initial: f64,
+    /// ρ, of each environment step.
+    ///
+    /// Differs from the paper: STAIR's comparison has 1e-3, with which nothing is left of the
+    /// bonus at the first session (2.3e-6 after 10,000 steps).
+    pub decay: f64,
+}
+
+impl Default for BonusConfig {
+    fn default() -> Self {
+        Self {
+            initial: 0.05,
+            decay: 1e-5,
+        }
+    }
+}
+
+impl BonusConfig {
+    /// β at an environment step.
+    ///
+    /// ```
+    /// let rune = learn::exploration::BonusConfig::default();
+    /// assert_eq!(rune.weight(0), 0.05);
+    /// assert!((rune.weight(100_000) - 0.018_394).abs() < 1e-6); // 0.05/e, nearly
+    /// ```
+    pub fn weight(&self, step: u64) -> f64 {
+        self.initial * (step as f64 * (-self.decay).ln_1p()).exp()
     }
 }
 
@@ -40,6 +89,8 @@ const CHUNK_STATES: usize = 512;
 pub struct StateEntropy {
     config: ExplorationConfig,
     running: RunningStd,
+    /// Smallest and largest distance seen.
+    range: (f64, f64),
 }
 
 impl StateEntropy {
@@ -49,35 +100,63 @@ impl StateEntropy {
         Self {
             config: config.clone(),
             running: RunningStd::new(),
+            range: (f64::INFINITY, f64::NEG_INFINITY),
         }
     }
 
     /// Novelty of a batch of states `[B × S]` from the replay against all states in it, `[B]`.
     pub fn intrinsic(&mut self, batch_observations: &[f32], replay: &Replay) -> Vec<f32> {
-        let size = replay.shape().observation;
-        let distances = neighbour_distances(
-            batch_observations,
-            size,
-            replay.visited_states(),
-            self.config.neighbours,
-        );
+        let distances = self.distances(batch_observations, replay);
         self.running
             .update(&distances, self.config.bpref_running_std);
-        let std = self.running.variance.sqrt();
+        let seen = distances.iter().copied().map(f64::from);
+        self.range.0 = seen.clone().fold(self.range.0, f64::min);
+        self.range.1 = seen.fold(self.range.1, f64::max);
+        let (mean, std) = (self.running.mean, self.running.variance.sqrt());
+        let reward = |d: &f32| match self.config.novelty {
+            Novelty::Scaled => f64::from(*d) / std,
+            Novelty::Centred => ((f64::from(*d) - mean) / (3.0 * std)).clamp(-1.0, 1.0),
+        };
+        distances.iter().map(|d| reward(d) as f32).collect()
+    }
+
+    /// What a reward model is warm-started on: (h − μ)/σ over its largest magnitude so far, in
+    /// [−1, 1] for all distances seen, `[B]`. Changes nothing.
+    ///
+    /// Source: RIME, §4.3, as in its released code.
+    pub fn warm_targets(&self, batch_observations: &[f32], replay: &Replay) -> Vec<f32> {
+        let mean = self.running.mean;
+        let reach = (self.range.0 - mean).abs().max((self.range.1 - mean).abs());
+        let reach = if reach.is_finite() && reach > 0.0 {
+            reach
+        } else {
+            1.0
+        };
+        let distances = self.distances(batch_observations, replay);
         distances
             .iter()
-            .map(|d| (f64::from(*d) / std) as f32)
+            .map(|d| ((f64::from(*d) - mean) / reach) as f32)
             .collect()
     }
 
-    /// The running moments.
+    fn distances(&self, batch_observations: &[f32], replay: &Replay) -> Vec<f32> {
+        neighbour_distances(
+            batch_observations,
+            replay.shape().observation,
+            replay.visited_states(),
+            self.config.neighbours,
+        )
+    }
+
+    /// The running moments and the range.
     pub fn save(&self, archive: &mut Archive) {
         let RunningStd {
             mean,
             variance,
             count,
         } = self.running;
-        archive.put_f64("exploration", &[mean, variance, count]);
+        let (lo, hi) = self.range;
+        archive.put_f64("exploration", &[mean, variance, count, lo, hi]);
     }
 
     /// What [`StateEntropy::save`] wrote.
@@ -85,7 +164,8 @@ impl StateEntropy {
     /// # Errors
     /// When the section is missing.
     pub fn load(&mut self, archive: &Archive) -> Result<(), LearnError> {
-        let [mean, variance, count] = archive.f64("exploration")?;
+        let [mean, variance, count, lo, hi] = archive.f64("exploration")?;
+        self.range = (lo, hi);
         self.running = RunningStd {
             mean,
             variance,
@@ -326,6 +406,45 @@ mod tests {
         // emulated with the released code: 0.504 after 2, 0.141 after 101 updates
         assert!((std_after(2, true) - 0.504).abs() < 0.01);
         assert!((std_after(101, true) - 0.141).abs() < 0.005);
+    }
+
+    /// RIME's: rewards of a learned reward's scale, and targets that reach −1 or 1.
+    #[test]
+    fn centred_novelty_and_warm_targets_lie_between_minus_one_and_one() {
+        let replay = replay(1_300);
+        let config = ExplorationConfig {
+            novelty: Novelty::Centred,
+            ..ExplorationConfig::default()
+        };
+        let (mut centred, mut scaled) = (
+            StateEntropy::new(&config),
+            StateEntropy::new(&ExplorationConfig::default()),
+        );
+        let batch = replay.sample(200, &mut Rng::new(2, Stream::Test, 0));
+        let centred_rewards = centred.intrinsic(&batch.observation, &replay);
+        let scaled_rewards = scaled.intrinsic(&batch.observation, &replay);
+        let (mean, std) = (centred.running.mean, centred.running.variance.sqrt());
+        for (c, s) in centred_rewards.iter().zip(&scaled_rewards) {
+            let expected = ((f64::from(*s) - mean / std) / 3.0).clamp(-1.0, 1.0);
+            assert!((f64::from(*c) - expected).abs() < 1e-5);
+        }
+        let targets = centred.warm_targets(&batch.observation, &replay);
+        let largest = targets.iter().fold(0.0_f32, |m, t| m.max(t.abs()));
+        assert!((largest - 1.0).abs() < 1e-6, "{largest}");
+        assert!(targets.iter().any(|t| *t < 0.0) && targets.iter().any(|t| *t > 0.0));
+    }
+
+    #[test]
+    fn a_bonus_fades_by_a_fixed_share_of_itself_each_step() {
+        let rune = BonusConfig::default();
+        let ratio = rune.weight(5_001) / rune.weight(5_000);
+        assert!((ratio - (1.0 - 1e-5)).abs() < 1e-12);
+        let papers = BonusConfig {
+            decay: 1e-3,
+            ..rune
+        };
+        assert!((papers.weight(10_000) - 2.26e-6).abs() < 1e-8);
+        assert!((rune.weight(10_000) - 0.045_24).abs() < 1e-5);
     }
 
     #[test]

@@ -17,6 +17,7 @@ pub mod exploration;
 pub mod replay;
 pub mod reward;
 pub mod sac;
+pub mod stage;
 pub mod temporal;
 
 mod adam;

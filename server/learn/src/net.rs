@@ -14,6 +14,8 @@ use crate::error::LearnError;
 use crate::kernel::{self, NormGradient, Normed};
 use crate::precision::{Precision, add_outer, product};
 
+mod tangent;
+
 /// Form of a stack of perceptrons.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct NetShape {
@@ -294,6 +296,12 @@ impl Parameters {
     /// One Adam step along the gradient.
     pub(crate) fn step(&mut self) {
         self.adam.step(&mut self.values, &self.gradient, 1.0);
+    }
+
+    /// The same with a share of the learning rate.
+    pub(crate) fn step_at(&mut self, rate: f64) {
+        self.adam
+            .step_at(&mut self.values, &self.gradient, 1.0, rate);
     }
 
     /// One Adam step along the gradient, scaled down to a norm of at most `max_norm`; returns

@@ -82,6 +82,31 @@ pub enum RewardSource {
     Task,
 }
 
+/// How a batch is drawn and what it carries.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BatchRule {
+    /// What its rewards are.
+    pub reward: RewardSource,
+    /// Of the disagreement of the learned reward, added to it; 0 leaves it out.
+    pub disagreement_weight: f32,
+    /// Newest transitions, of all lanes together, from which half of the rows are drawn; the
+    /// other half from everything. `None` draws all from everything.
+    pub recent: Option<usize>,
+    /// Whether nothing follows a time limit either: values do not bootstrap there.
+    pub ends_at_time_limit: bool,
+}
+
+impl Default for BatchRule {
+    fn default() -> Self {
+        Self {
+            reward: RewardSource::Learned,
+            disagreement_weight: 0.0,
+            recent: None,
+            ends_at_time_limit: false,
+        }
+    }
+}
+
 /// Transitions drawn for one SAC update, row-major.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Batch {
@@ -119,6 +144,7 @@ pub struct Replay {
     lanes: Vec<Lane>,
     episodes: Vec<Episode>,
     complete: Vec<EpisodeId>,
+    keeps_disagreement: bool,
     journal: journal::Journal,
 }
 
@@ -130,6 +156,8 @@ struct Lane {
     stages: Vec<u8>,
     actions: Vec<f32>,
     learned_rewards: Vec<f32>,
+    /// As long as the rewards where it is kept, else empty.
+    disagreements: Vec<f32>,
     task_rewards: Vec<f64>,
     marks: Vec<StepMark>,
     /// Which episode each step belongs to.
@@ -186,6 +214,7 @@ impl Replay {
                 .collect(),
             episodes: Vec::new(),
             complete: Vec::new(),
+            keeps_disagreement: false,
             journal: journal::Journal::new(n_lanes),
         }
     }
@@ -230,6 +259,9 @@ impl Replay {
         assert_eq!(step.action.len(), self.shape.action, "size of an action");
         rows.actions.extend_from_slice(step.action);
         rows.learned_rewards.push(step.learned_reward);
+        if self.keeps_disagreement {
+            rows.disagreements.push(0.0);
+        }
         rows.task_rewards.push(step.task_reward.0);
         rows.marks.push(StepMark::new(step.success, step.end));
         rows.episode_of.push(id.0);
@@ -291,6 +323,17 @@ impl Replay {
     /// Episodes that came to an end, in the order in which they did.
     pub fn complete_episodes(&self) -> &[EpisodeId] {
         &self.complete
+    }
+
+    /// Mean task reward of a step over the `n` newest complete episodes; `None` before the first.
+    pub fn typical_reward(&self, n: usize) -> Option<TaskReward> {
+        let newest = &self.complete[self.complete.len().saturating_sub(n)..];
+        let total = |value: &dyn Fn(&Episode) -> f64| -> f64 {
+            let episodes = newest.iter().map(|id| &self.episodes[id.0 as usize]);
+            episodes.map(value).sum()
+        };
+        let n_steps = total(&|e| f64::from(e.len));
+        (n_steps > 0.0).then(|| TaskReward(total(&|e| e.task_return) / n_steps))
     }
 
     /// State before step `t` of an episode, `[S]`; `t` = its length gives the final state.
@@ -380,7 +423,20 @@ impl Replay {
     ///
     /// # Panics
     /// When there is no transition yet.
-    pub fn sample_with(&self, n: usize, rng: &mut Rng, source: RewardSource) -> Batch {
+    pub fn sample_with(&self, n: usize, rng: &mut Rng, reward: RewardSource) -> Batch {
+        let rule = BatchRule {
+            reward,
+            ..BatchRule::default()
+        };
+        self.draw(n, rng, &rule)
+    }
+
+    /// `n` transitions drawn with replacement as `rule` says; where half of them are recent,
+    /// those come last.
+    ///
+    /// # Panics
+    /// When there is no transition yet.
+    pub fn draw(&self, n: usize, rng: &mut Rng, rule: &BatchRule) -> Batch {
         let (s, a, len) = (self.shape.observation, self.shape.action, self.len());
         let mut batch = Batch {
             observation: Vec::with_capacity(n * s),
@@ -389,8 +445,15 @@ impl Replay {
             next_observation: Vec::with_capacity(n * s),
             not_terminal: Vec::with_capacity(n),
         };
-        for _ in 0..n {
-            let (lane, step) = self.locate(rng.below(len));
+        let n_recent = rule.recent.map_or(0, |_| n / 2);
+        let recent = self.recent(rule.recent.unwrap_or(0));
+        let len_recent = recent.iter().map(|(_, steps)| steps.len()).sum();
+        for index in 0..n {
+            let (lane, step) = if index < n - n_recent {
+                self.locate(rng.below(len))
+            } else {
+                locate_recent(&recent, rng.below(len_recent))
+            };
             let state = self.state_of(lane, step);
             batch
                 .observation
@@ -399,14 +462,55 @@ impl Replay {
                 .next_observation
                 .extend_from_slice(row(&lane.observations, state + 1, s));
             batch.action.extend_from_slice(row(&lane.actions, step, a));
-            batch.reward.push(match source {
-                RewardSource::Learned => lane.learned_rewards[step],
-                RewardSource::Task => lane.task_rewards[step] as f32,
-            });
-            let is_terminal = lane.marks[step].end() == Some(EpisodeEnd::Terminal);
-            batch.not_terminal.push(if is_terminal { 0.0 } else { 1.0 });
+            batch.reward.push(lane.reward(step, rule));
+            let is_over = match lane.marks[step].end() {
+                Some(EpisodeEnd::Terminal) => true,
+                Some(EpisodeEnd::TimeLimit) => rule.ends_at_time_limit,
+                None => false,
+            };
+            batch.not_terminal.push(if is_over { 0.0 } else { 1.0 });
         }
         batch
+    }
+
+    /// The newest steps of each lane that make up `n` in all: lanes step side by side.
+    fn recent(&self, n: usize) -> Vec<(&Lane, std::ops::Range<usize>)> {
+        let own = n.div_ceil(self.lanes.len());
+        let lanes = self.lanes.iter();
+        lanes
+            .map(|lane| {
+                let n_steps = lane.marks.len();
+                (lane, n_steps - own.min(n_steps)..n_steps)
+            })
+            .collect()
+    }
+
+    /// Keeps a column for how much the members of the learned reward disagree about each step,
+    /// 0 until it is written.
+    pub fn keep_disagreement(&mut self) {
+        self.keeps_disagreement = true;
+        for lane in &mut self.lanes {
+            lane.disagreements.resize(lane.marks.len(), 0.0);
+        }
+    }
+
+    /// Whether that column is kept.
+    pub fn keeps_disagreement(&self) -> bool {
+        self.keeps_disagreement
+    }
+
+    /// Writes the disagreement about the newest step of a lane.
+    ///
+    /// # Panics
+    /// When the column is not kept or the lane has no step.
+    pub fn note_disagreement(&mut self, lane: usize, disagreement: f32) {
+        let column = &mut self.lanes[lane].disagreements;
+        *column.last_mut().expect("a kept column with a step") = disagreement;
+    }
+
+    /// Disagreement about one lane's steps, to be rewritten; empty where it is not kept.
+    pub(crate) fn disagreements_mut(&mut self, lane: usize) -> &mut [f32] {
+        &mut self.lanes[lane].disagreements
     }
 
     /// Number of parallel environments.
@@ -491,6 +595,15 @@ impl Replay {
 }
 
 impl Lane {
+    fn reward(&self, step: usize, rule: &BatchRule) -> f32 {
+        let reward = match rule.reward {
+            RewardSource::Learned => self.learned_rewards[step],
+            RewardSource::Task => self.task_rewards[step] as f32,
+        };
+        let disagreement = self.disagreements.get(step).copied().unwrap_or(0.0);
+        reward + rule.disagreement_weight * disagreement
+    }
+
     fn push_state(
         &mut self,
         shape: ReplayShape,
@@ -508,6 +621,20 @@ impl Lane {
         self.poses.extend_from_slice(pose);
         self.stages.push(stage.unwrap_or(NO_STAGE));
     }
+}
+
+/// Lane and step of the recent transition with number `index`, lane after lane.
+fn locate_recent<'a>(
+    recent: &[(&'a Lane, std::ops::Range<usize>)],
+    mut index: usize,
+) -> (&'a Lane, usize) {
+    for (lane, steps) in recent {
+        if index < steps.len() {
+            return (lane, steps.start + index);
+        }
+        index -= steps.len();
+    }
+    unreachable!("an index below the number of recent transitions")
 }
 
 fn row(values: &[f32], index: usize, size: usize) -> &[f32] {

@@ -15,6 +15,16 @@ use crate::net::{Net, NetShape, Parameters, matrix, to_vec};
 use crate::precision::Precision;
 use crate::replay::Replay;
 
+mod denoise;
+mod learner;
+mod meta;
+mod semi;
+
+pub use denoise::{Denoising, DenoisingConfig};
+pub use learner::{Lesson, RewardLearner, Supervised};
+pub use meta::SteeringConfig;
+pub use semi::{SemiSupervised, SemiSupervisedConfig};
+
 /// Settings of the ensemble. Defaults: the released settings for MetaWorld.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -96,6 +106,25 @@ pub struct RewardFit {
     pub accuracy: f32,
 }
 
+/// What the members say about steps.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Estimate {
+    /// Mean over members, in (−1, 1), `[n]`.
+    pub rewards: Vec<f32>,
+    /// std over members (their number in the denominator), `[n]`.
+    pub disagreements: Vec<f32>,
+}
+
+impl Estimate {
+    /// Nothing is known of `n` steps: zeros.
+    pub fn unknown(n: usize) -> Self {
+        Self {
+            rewards: vec![0.0; n],
+            disagreements: vec![0.0; n],
+        }
+    }
+}
+
 /// Of `LeakyReLU`, as PyTorch's default.
 const SLOPE: f64 = 0.01;
 /// Rows that are computed at once, per member: their hidden layers stay in the cache.
@@ -116,9 +145,54 @@ pub struct RewardEnsemble {
 /// One member's order of the preferences in an epoch, and how it did.
 struct Pass {
     order: Vec<usize>,
+    n_seen: usize,
     loss: f64,
     n_right: u32,
     n_judged: u32,
+}
+
+impl Pass {
+    fn new(order: Vec<usize>) -> Self {
+        Self {
+            order,
+            n_seen: 0,
+            loss: 0.0,
+            n_right: 0,
+            n_judged: 0,
+        }
+    }
+
+    /// Equal preferences count for the loss alone.
+    fn record(&mut self, example: &Example, logit: f64) {
+        self.n_seen += 1;
+        self.loss += softplus(logit) - example.target * logit;
+        let side = example.target - 0.5;
+        if side.abs() > f64::EPSILON {
+            self.n_judged += 1;
+            self.n_right += u32::from((logit > 0.0) == (side > 0.0));
+        }
+    }
+}
+
+/// What the members' passes say together.
+fn summary(passes: &[Pass], n_epochs: u32) -> RewardFit {
+    let mean =
+        |value: &dyn Fn(&Pass) -> f64| passes.iter().map(value).sum::<f64>() / passes.len() as f64;
+    RewardFit {
+        n_epochs,
+        loss: mean(&|p| p.loss / p.n_seen.max(1) as f64) as f32,
+        accuracy: mean(&|p| f64::from(p.n_right) / f64::from(p.n_judged.max(1))) as f32,
+    }
+}
+
+/// A pair as a member's loss sees it.
+#[derive(Debug, Clone, Copy)]
+struct Example {
+    query: Query,
+    /// Of P(second ≻ first).
+    target: f64,
+    /// Of its cross-entropy.
+    weight: f64,
 }
 
 impl RewardEnsemble {
@@ -174,14 +248,8 @@ impl RewardEnsemble {
         if labeled.is_empty() {
             return fit;
         }
-        for _ in 0..self.config.max_epochs {
-            let passes = self.epoch(replay, labeled);
-            let mean = |value: &dyn Fn(&Pass) -> f64| {
-                passes.iter().map(value).sum::<f64>() / passes.len() as f64
-            };
-            fit.n_epochs += 1;
-            fit.loss = mean(&|p| p.loss / labeled.len() as f64) as f32;
-            fit.accuracy = mean(&|p| f64::from(p.n_right) / f64::from(p.n_judged.max(1))) as f32;
+        for n_epochs in 1..=self.config.max_epochs {
+            fit = summary(&self.epoch(replay, labeled, 1.0), n_epochs);
             if fit.accuracy > self.config.stop_accuracy {
                 break;
             }
@@ -189,36 +257,23 @@ impl RewardEnsemble {
         fit
     }
 
-    fn epoch(&mut self, replay: &Replay, labeled: &[Labeled]) -> Vec<Pass> {
+    /// One pass of every member over all preferences, at a share of the learning rate.
+    fn epoch(&mut self, replay: &Replay, labeled: &[Labeled], rate: f64) -> Vec<Pass> {
         let mut rng = Rng::new(self.seed, Stream::RewardFit, self.n_epochs);
         self.n_epochs += 1;
-        let pass = |_| Pass {
-            order: rng.permutation(labeled.len()),
-            loss: 0.0,
-            n_right: 0,
-            n_judged: 0,
-        };
-        let mut passes: Vec<Pass> = (0..self.config.members).map(pass).collect();
+        let members = 0..self.config.members;
+        let mut passes: Vec<Pass> = members
+            .map(|_| Pass::new(rng.permutation(labeled.len())))
+            .collect();
         for start in (0..labeled.len()).step_by(self.config.batch) {
             let end = labeled.len().min(start + self.config.batch);
-            self.minibatch(replay, labeled, &mut passes, start..end);
+            self.gradient(replay, labeled, &mut passes, start..end);
+            self.parameters.step_at(rate);
         }
         passes
     }
 
-    /// One Adam step on a range of each member's order. The loss is a sum over pairs, so a few
-    /// pairs at a time go forward and back while their hidden layers are in the cache.
-    fn minibatch(
-        &mut self,
-        replay: &Replay,
-        labeled: &[Labeled],
-        passes: &mut [Pass],
-        range: std::ops::Range<usize>,
-    ) {
-        self.gradient(replay, labeled, passes, range);
-        self.parameters.step();
-    }
-
+    /// Fills the gradient with that of a range of each member's order.
     fn gradient(
         &mut self,
         replay: &Replay,
@@ -226,59 +281,126 @@ impl RewardEnsemble {
         passes: &mut [Pass],
         range: std::ops::Range<usize>,
     ) {
-        self.parameters.zero_gradient();
-        let longest = labeled.iter().map(|l| longest(&l.query)).max().unwrap_or(1);
-        let pairs_at_once = (CHUNK_ROWS / (2 * longest)).max(1);
         let weight = 1.0 / range.len() as f64;
-        for start in range.clone().step_by(pairs_at_once) {
-            let end = range.end.min(start + pairs_at_once);
-            let pairs: Vec<Labeled> = passes
-                .iter()
-                .flat_map(|p| p.order[start..end].iter().map(|&i| labeled[i]))
+        let orders = passes.iter().flat_map(|p| &p.order[range.clone()]);
+        let examples: Vec<Example> = orders.map(|&i| self.example(&labeled[i], weight)).collect();
+        self.parameters.zero_gradient();
+        let logits = self.add_gradient(replay, &examples);
+        let own = examples.chunks(range.len()).zip(logits.chunks(range.len()));
+        for (pass, (examples, logits)) in passes.iter_mut().zip(own) {
+            for (example, logit) in examples.iter().zip(logits) {
+                pass.record(example, *logit);
+            }
+        }
+    }
+
+    /// A preference as the loss sees it.
+    fn example(&self, labeled: &Labeled, weight: f64) -> Example {
+        let certain = f64::from(labeled.preference.target());
+        Example {
+            query: labeled.query,
+            target: certain + self.config.label_margin * (1.0 - 2.0 * certain),
+            weight,
+        }
+    }
+
+    /// One Adam step on examples `[M][n]`; returns their logits before it.
+    fn step(&mut self, replay: &Replay, examples: &[Example]) -> Vec<f64> {
+        self.parameters.zero_gradient();
+        let logits = self.add_gradient(replay, examples);
+        self.parameters.step();
+        logits
+    }
+
+    /// Adds the gradient of examples `[M][n]`; returns their logits. The loss is a sum over
+    /// pairs, so a few pairs at a time go forward and back while their hidden layers are in the
+    /// cache.
+    fn add_gradient(&mut self, replay: &Replay, examples: &[Example]) -> Vec<f64> {
+        let n_members = self.config.members;
+        let n = examples.len() / n_members;
+        let longest = examples
+            .iter()
+            .map(|e| longest(&e.query))
+            .max()
+            .unwrap_or(1);
+        let pairs_at_once = (CHUNK_ROWS / (2 * longest)).max(1);
+        let mut all_logits = vec![0.0; examples.len()];
+        for start in (0..n).step_by(pairs_at_once) {
+            let end = n.min(start + pairs_at_once);
+            let own = |member: usize| member * n + start..member * n + end;
+            let pairs: Vec<Example> = (0..n_members)
+                .flat_map(|member| &examples[own(member)])
+                .copied()
                 .collect();
-            let chunk = Chunk::gather(replay, pairs.iter().map(|l| &l.query), longest);
+            let chunk = Chunk::gather(replay, pairs.iter().map(|e| &e.query), longest);
             let input = self
                 .input(&chunk.rows)
-                .view([passes.len() as i64, -1, self.columns]);
+                .view([n_members as i64, -1, self.columns]);
             let (output, tape) = self.net.forward_taped(&input);
             let reward = output.tanh();
             let logits = chunk.logits(&to_vec(&reward));
-            let n = end - start;
-            let mut slopes = Vec::with_capacity(pairs.len());
-            for (index, (labeled, logit)) in pairs.iter().zip(logits).enumerate() {
-                let pass = &mut passes[index / n];
-                let certain = f64::from(labeled.preference.target());
-                let target = certain + self.config.label_margin * (1.0 - 2.0 * certain);
+            let slope = |(example, logit): (&Example, &f64)| {
                 let probability = 1.0 / (1.0 + (-logit).exp());
-                pass.loss += softplus(logit) - target * logit;
-                if labeled.preference != Preference::Equal {
-                    pass.n_judged += 1;
-                    pass.n_right += u32::from((logit > 0.0) == (certain > 0.5));
-                }
-                slopes.push((probability - target) * weight);
-            }
+                (probability - example.target) * example.weight
+            };
+            let slopes: Vec<f64> = pairs.iter().zip(&logits).map(slope).collect();
             let slopes = matrix(&chunk.row_slopes(&slopes), 1, self.options).view_as(&reward);
             let gradient = slopes * (1.0 - reward.square());
             self.net
                 .backward(&tape, &gradient, Some(&mut self.gradient), None);
+            for (member, logits) in logits.chunks(end - start).enumerate() {
+                all_logits[own(member)].copy_from_slice(logits);
+            }
         }
+        all_logits
+    }
+
+    /// Each member's logits of its own queries, `[M][n]`.
+    fn member_logits(&self, replay: &Replay, queries: &[Query]) -> Vec<f64> {
+        let n = queries.len() / self.config.members;
+        let longest = queries.iter().map(longest).max().unwrap_or(1);
+        let pairs_at_once = (CHUNK_ROWS / (2 * longest)).max(1);
+        let mut all_logits = vec![0.0; queries.len()];
+        for start in (0..n).step_by(pairs_at_once) {
+            let end = n.min(start + pairs_at_once);
+            let own = |member: usize| member * n + start..member * n + end;
+            let pairs = (0..self.config.members).flat_map(|member| &queries[own(member)]);
+            let chunk = Chunk::gather(replay, pairs, longest);
+            let input =
+                self.input(&chunk.rows)
+                    .view([self.config.members as i64, -1, self.columns]);
+            let logits = chunk.logits(&to_vec(&self.net.forward(&input).tanh()));
+            for (member, logits) in logits.chunks(end - start).enumerate() {
+                all_logits[own(member)].copy_from_slice(logits);
+            }
+        }
+        all_logits
     }
 
     /// Mean over members of each step's reward, in (−1, 1), `[n]`, for rows `[n × S]`, `[n × A]`.
     pub fn predict(&self, observations: &[f32], actions: &[f32]) -> Vec<f32> {
-        if actions.is_empty() {
-            return Vec::new();
-        }
-        let n_rows = observations.len() + actions.len();
-        let n_rows = (n_rows as i64 / self.columns) as usize;
-        let (s, a) = (observations.len() / n_rows, actions.len() / n_rows);
-        let rows = observations.chunks_exact(s).zip(actions.chunks_exact(a));
-        let rows: Vec<f32> = rows.flat_map(|(s, a)| s.iter().chain(a)).copied().collect();
-        let chunks = rows.chunks(CHUNK_ROWS * self.columns as usize);
-        chunks.flat_map(|rows| self.mean_rewards(rows)).collect()
+        self.estimate(observations, actions).rewards
     }
 
-    /// Rewrites the learned reward of every transition.
+    /// The same with the members' disagreement about each.
+    pub fn estimate(&self, observations: &[f32], actions: &[f32]) -> Estimate {
+        let mut estimate = Estimate::unknown(0);
+        if actions.is_empty() {
+            return estimate;
+        }
+        let n_numbers = observations.len() + actions.len();
+        let n_rows = (n_numbers as i64 / self.columns) as usize;
+        let rows = joined(observations, actions, n_rows);
+        for rows in rows.chunks(CHUNK_ROWS * self.columns as usize) {
+            let own = self.moments(rows);
+            estimate.rewards.extend(own.rewards);
+            estimate.disagreements.extend(own.disagreements);
+        }
+        estimate
+    }
+
+    /// Rewrites the learned reward of every transition, and the members' disagreement about it
+    /// where the replay keeps it.
     pub fn relabel(&self, replay: &mut Replay) {
         let mut rows = Vec::new();
         for lane in 0..replay.n_lanes() {
@@ -287,8 +409,11 @@ impl RewardEnsemble {
                 let end = n_steps.min(start + CHUNK_ROWS);
                 rows.clear();
                 replay.append_lane_rows(lane, start..end, &mut rows);
-                replay.learned_rewards_mut(lane)[start..end]
-                    .copy_from_slice(&self.mean_rewards(&rows));
+                let own = self.moments(&rows);
+                replay.learned_rewards_mut(lane)[start..end].copy_from_slice(&own.rewards);
+                if replay.keeps_disagreement() {
+                    replay.disagreements_mut(lane)[start..end].copy_from_slice(&own.disagreements);
+                }
             }
         }
     }
@@ -329,14 +454,27 @@ impl RewardEnsemble {
         Ok(())
     }
 
-    fn mean_rewards(&self, rows: &[f32]) -> Vec<f32> {
+    fn moments(&self, rows: &[f32]) -> Estimate {
         let reward = self.net.forward(&self.input(rows)).tanh();
-        to_vec(&reward.mean_dim([0_i64].as_slice(), false, None))
+        let mean = reward.mean_dim([0_i64].as_slice(), false, None);
+        let squares = (reward - &mean).square();
+        let std = squares.mean_dim([0_i64].as_slice(), false, None).sqrt();
+        Estimate {
+            rewards: to_vec(&mean),
+            disagreements: to_vec(&std),
+        }
     }
 
     fn input(&self, rows: &[f32]) -> Tensor {
         matrix(rows, self.columns, self.options)
     }
+}
+
+/// Rows of `S + A` from `n_rows` rows of each.
+fn joined(observations: &[f32], actions: &[f32], n_rows: usize) -> Vec<f32> {
+    let (s, a) = (observations.len() / n_rows, actions.len() / n_rows);
+    let rows = observations.chunks_exact(s).zip(actions.chunks_exact(a));
+    rows.flat_map(|(s, a)| s.iter().chain(a)).copied().collect()
 }
 
 /// std over members (their number in the denominator) of P(second ≻ first), `[N]`.
@@ -350,6 +488,18 @@ pub(crate) fn disagreement(probabilities: &[Vec<f32>]) -> Vec<f32> {
         (squares.sum::<f32>() / n_members).sqrt()
     };
     (0..n_queries).map(std).collect()
+}
+
+/// Mean over members of −Σ p ln p of P(second ≻ first) and its opposite, nats, `[N]`.
+pub(crate) fn entropy(probabilities: &[Vec<f32>]) -> Vec<f32> {
+    let n_members = probabilities.len() as f32;
+    let n_queries = probabilities.first().map_or(0, Vec::len);
+    let own = |p: f32| {
+        let part = |p: f32| if p > 0.0 { -p * p.ln() } else { 0.0 };
+        part(p) + part(1.0 - p)
+    };
+    let mean = |query: usize| probabilities.iter().map(|m| own(m[query])).sum::<f32>() / n_members;
+    (0..n_queries).map(mean).collect()
 }
 
 /// Rows of several pairs, first then second segment, each padded to the longest.

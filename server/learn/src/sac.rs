@@ -13,8 +13,10 @@ use crate::net::{Net, NetShape, Parameters, load_tensor, matrix, save_tensor, to
 use crate::precision::Precision;
 use crate::replay::Batch;
 
+mod outer;
 mod policy;
 
+pub(crate) use outer::FirstSteps;
 use policy::Gaussian;
 
 /// Settings of the agent. Defaults: STAIR's released settings for MetaWorld (which are BPref's).
@@ -129,6 +131,7 @@ pub struct Sac {
     action_size: i64,
     actor: Trained,
     critic: Trained,
+    critic_shape: NetShape,
     target_values: Tensor,
     target: Net,
     temperature: Temperature,
@@ -208,7 +211,7 @@ impl Sac {
         )
     }
 
-    fn with_kind(
+    pub(crate) fn with_kind(
         config: &SacConfig,
         sizes: (usize, usize),
         seed: u64,
@@ -228,6 +231,7 @@ impl Sac {
             actor: Trained::new(&actor_shape, config.actor_learning_rate, options),
             critic,
             target: Net::over(&critic_shape, &target_values, 0),
+            critic_shape,
             target_values,
             temperature: Temperature {
                 log_alpha: config.initial_temperature.ln(),

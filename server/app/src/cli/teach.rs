@@ -8,7 +8,7 @@ use domain::answer::{Preference, Which};
 use domain::environment::TaskReward;
 use domain::episode::{EpisodeId, Segment, SegmentRecord};
 use domain::query::{OfferedQuery, QueryKey};
-use domain::teacher::Judge;
+use domain::teacher::{Judge, TeacherSettings};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -52,7 +52,8 @@ pub struct Args {
 /// [`super::BadInput`] for a server that cannot be reached, an unknown run or teacher, a wrong token;
 /// anything else that the server refuses.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
-    super::train::judge(&args.teacher, 0)?; // a wrong name is said before anything is sent
+    let settings = TeacherSettings::default();
+    super::train::judge(&args.teacher, 0, &settings)?; // a wrong name is said before anything is sent
     let mut client = Client::new(&args.server, PATIENCE)?;
     let run = format!("/api/v1/runs/{}", path_segment(&args.run)?);
     let told = client.get(&run)?;
@@ -68,7 +69,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let mut teacher = Remote {
         client,
         run,
-        judge: super::train::judge(&args.teacher, seed)?,
+        judge: super::train::judge(&args.teacher, seed, &settings)?,
         n_answered: 0,
     };
     let started = Instant::now();
@@ -227,6 +228,7 @@ fn preference(judge: &dyn Judge, truth: TaskRewards) -> Value {
         asks_same_stage: false,
         disagreement: None,
         stage_gap: None,
+        typical_reward: None,
     };
     match judge.judge(&query) {
         Some(Preference::Prefer(which)) => {

@@ -6,7 +6,7 @@ use std::sync::mpsc::{Sender, channel};
 use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
-use domain::teacher::{Judge, Scripted};
+use domain::teacher::{Judge, Scripted, TeacherSettings};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use lab::config::{Layers, RunConfig};
 use lab::message::{Command, Event};
@@ -74,7 +74,7 @@ pub struct Args {
 )]
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let (mut run, folder) = open(&args)?;
-    let judge = judge(&args.teacher, run.config().seed)?;
+    let judge = judge(&args.teacher, run.config().seed, &run.config().teacher)?;
     let mut teacher = Scripted::new(judge, run.consumed_sequence());
     let (sender, commands) = channel();
     stop_on_interrupt(sender)?;
@@ -176,8 +176,12 @@ fn layers(args: &Args) -> anyhow::Result<Layers> {
 ///
 /// # Errors
 /// [`BadInput`] names the nearest right one.
-pub(super) fn judge(name: &str, seed: u64) -> anyhow::Result<Box<dyn Judge>> {
-    domain::teacher::judge(name, seed).ok_or_else(|| {
+pub(super) fn judge(
+    name: &str,
+    seed: u64,
+    settings: &TeacherSettings,
+) -> anyhow::Result<Box<dyn Judge>> {
+    domain::teacher::judge(name, seed, settings).ok_or_else(|| {
         let known: Vec<&str> = domain::teacher::SCRIPTED
             .iter()
             .map(|(name, _)| *name)

@@ -94,7 +94,7 @@ impl Driver {
             let (store, runtime) = (self.inner.store.clone(), self.inner.runtime.clone());
             return Ok(Box::new(HumanTeacher::new(store, runtime, self.run, clips)));
         }
-        let judge = domain::teacher::judge(name, run.config().seed);
+        let judge = domain::teacher::judge(name, run.config().seed, &run.config().teacher);
         let judge = judge.with_context(|| format!("there is no teacher '{name}'"))?;
         Ok(Box::new(Scripted::new(judge, run.consumed_sequence())))
     }

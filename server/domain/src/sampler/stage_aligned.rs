@@ -43,6 +43,10 @@ impl QuerySampler for StageAligned {
             self.coefficients,
         ))
     }
+
+    fn needs_stage_gap(&self) -> bool {
+        true
+    }
 }
 
 /// Prefers queries the ensemble is unsure about and whose segments show the same stage.

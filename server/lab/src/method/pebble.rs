@@ -2,6 +2,7 @@
 
 use domain::sampler::Disagreement;
 use learn::replay::RewardSource;
+use learn::reward::Supervised;
 
 use super::Method;
 use crate::config::RunConfig;
@@ -11,6 +12,10 @@ pub(crate) fn pebble(_config: &RunConfig) -> Method {
     Method {
         sampler: Some(Box::new(Disagreement)),
         reward: RewardSource::Learned,
-        learns_temporal_distance: false,
+        stage: None,
+        reward_learner: |_| Box::new(Supervised),
+        bonus: None,
+        recent_episodes: None,
+        steering: None,
     }
 }

@@ -2,14 +2,14 @@
 
 use learn::replay::RewardSource;
 
-use super::Method;
+use super::{Method, pebble::pebble};
 use crate::config::RunConfig;
 
 /// Never asks; the critics see the task reward.
-pub(crate) fn sac(_config: &RunConfig) -> Method {
+pub(crate) fn sac(config: &RunConfig) -> Method {
     Method {
         sampler: None,
         reward: RewardSource::Task,
-        learns_temporal_distance: false,
+        ..pebble(config)
     }
 }

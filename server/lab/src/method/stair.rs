@@ -1,6 +1,7 @@
 //! STAIR: PEBBLE with stage-aligned queries.
 
 use domain::sampler::StageAligned;
+use learn::stage::StageApproximator;
 
 use super::{Method, pebble::pebble};
 use crate::config::RunConfig;
@@ -11,7 +12,16 @@ pub(crate) fn stair(config: &RunConfig) -> Method {
         sampler: Some(Box::new(StageAligned {
             coefficients: config.queries.coefficients,
         })),
-        learns_temporal_distance: true,
+        stage: Some(gap(config)),
         ..pebble(config)
+    }
+}
+
+/// The quadrilateral distance, one way as in the paper or both ways.
+pub(super) fn gap(config: &RunConfig) -> StageApproximator {
+    if config.queries.symmetric_gap {
+        StageApproximator::SymmetricQuadrilateral
+    } else {
+        StageApproximator::Quadrilateral
     }
 }

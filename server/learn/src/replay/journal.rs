@@ -82,7 +82,8 @@ impl Replay {
     /// Makes everything so far durable in `folder` and says where it ends.
     ///
     /// What happened is appended to the journal; the reward column, which relabelling
-    /// rewrites, goes whole into a file of its own (4 bytes a step).
+    /// rewrites, goes whole into a file of its own (4 bytes a step), with the column of
+    /// disagreement where it is kept (as much again).
     ///
     /// # Errors
     /// When the folder cannot be written; the replay then tries the same again.
@@ -236,6 +237,9 @@ impl Replay {
         for lane in &self.lanes {
             put(&mut bytes, &lane.learned_rewards);
         }
+        for lane in &self.lanes {
+            put(&mut bytes, &lane.disagreements);
+        }
         let sum = Checksum::of(&bytes);
         bytes.extend(sum.to_le_bytes());
         bytes
@@ -244,8 +248,10 @@ impl Replay {
     fn read_column(&mut self, folder: &Path, mark: &ReplayMark) -> Result<(), LearnError> {
         let path = column_path(folder, mark.column);
         let bytes = std::fs::read(&path).map_err(|e| LearnError::file("read", &path, e))?;
-        let n_bytes = 4 * self.len();
-        if self.len() as u64 != mark.n_steps || bytes.len() != n_bytes + 8 {
+        let one_column = 4 * self.len();
+        let n_bytes = bytes.len().saturating_sub(8);
+        let n_columns_fit = n_bytes == one_column || n_bytes == 2 * one_column;
+        if self.len() as u64 != mark.n_steps || bytes.len() < 8 || !n_columns_fit {
             return Err(LearnError::damaged(&path, "it has the wrong length"));
         }
         let (values, sum) = bytes.split_at(n_bytes);
@@ -259,6 +265,14 @@ impl Replay {
         for lane in &mut self.lanes {
             lane.learned_rewards
                 .iter_mut()
+                .zip(&mut values)
+                .for_each(|(to, from)| *to = from);
+        }
+        if n_bytes > one_column {
+            self.keep_disagreement();
+            let columns = self.lanes.iter_mut().map(|lane| &mut lane.disagreements);
+            columns
+                .flatten()
                 .zip(&mut values)
                 .for_each(|(to, from)| *to = from);
         }

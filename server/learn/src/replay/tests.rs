@@ -179,3 +179,117 @@ fn a_step_takes_the_bytes_that_its_shape_says() {
         replay.len() * SHAPE.step_bytes()
     );
 }
+
+/// QPA's batches: rows 0 to 49 from everything, 50 to 99 from the newest ten steps of both lanes.
+#[test]
+fn half_of_a_batch_is_recent_where_the_rule_says_so() {
+    let mut replay = Replay::new(SHAPE, 2);
+    push_steps(&mut replay, 0, 60);
+    let rule = BatchRule {
+        recent: Some(10),
+        ..BatchRule::default()
+    };
+    let batch = replay.draw(100, &mut Rng::new(1, Stream::Test, 0), &rule);
+    let newest: Vec<f32> = replay
+        .lanes
+        .iter()
+        .flat_map(|lane| &lane.learned_rewards[55..60])
+        .copied()
+        .collect();
+    let n_new = |rewards: &[f32]| rewards.iter().filter(|r| newest.contains(r)).count();
+    assert_eq!(n_new(&batch.reward[50..]), 50);
+    assert!(n_new(&batch.reward[..50]) < 20);
+    for reward in newest {
+        assert!(batch.reward[50..].contains(&reward), "{reward} is drawn");
+    }
+    let whole = BatchRule {
+        recent: Some(1_000_000),
+        ..BatchRule::default()
+    };
+    assert_eq!(
+        replay
+            .draw(7, &mut Rng::new(1, Stream::Test, 0), &whole)
+            .len(),
+        7
+    );
+}
+
+#[test]
+fn time_limits_end_where_the_rule_says_so() {
+    let mut replay = Replay::new(SHAPE, 2);
+    push_steps(&mut replay, 0, 70);
+    let n_ends = |ends_at_time_limit| {
+        let rule = BatchRule {
+            ends_at_time_limit,
+            ..BatchRule::default()
+        };
+        let batch = replay.draw(700, &mut Rng::new(1, Stream::Test, 0), &rule);
+        batch.not_terminal.iter().filter(|x| **x == 0.0).count()
+    };
+    // lane 0 ends one step in five for good, lane 1 one in seven by the clock
+    let (terminal, all) = (n_ends(false), n_ends(true));
+    assert!(
+        (50..90).contains(&terminal) && (90..150).contains(&all),
+        "{terminal} {all}"
+    );
+}
+
+/// RUNE's reward, and its column through a checkpoint.
+#[test]
+fn disagreement_is_weighed_into_the_reward_and_kept_on_disk() {
+    let folder = folder("disagreement");
+    let mut replay = Replay::new(SHAPE, 2);
+    push_steps(&mut replay, 0, 9);
+    replay.keep_disagreement();
+    push_steps(&mut replay, 9, 12);
+    replay.disagreements_mut(0).fill(0.5);
+    replay.note_disagreement(1, 0.25);
+    let rewards = |replay: &Replay, disagreement_weight| {
+        let rule = BatchRule {
+            disagreement_weight,
+            ..BatchRule::default()
+        };
+        replay
+            .draw(300, &mut Rng::new(1, Stream::Test, 0), &rule)
+            .reward
+    };
+    let plain = rewards(&replay, 0.0);
+    let mut added: Vec<f32> = rewards(&replay, 2.0)
+        .iter()
+        .zip(&plain)
+        .map(|(curious, plain)| (curious - plain) * 100.0)
+        .map(f32::round)
+        .collect();
+    added.sort_by(f32::total_cmp);
+    added.dedup();
+    assert_eq!(added, [0.0, 50.0, 100.0]);
+    let mark = replay.sync(&folder).expect("synced");
+    let opened = Replay::open(&folder, SHAPE, 2, &mark).expect("opened");
+    assert!(opened.keeps_disagreement() && same(&replay, &opened));
+    assert_eq!(rewards(&opened, 2.0), rewards(&replay, 2.0));
+    let _ = std::fs::remove_dir_all(&folder);
+}
+
+#[test]
+fn the_typical_reward_is_a_mean_over_the_newest_complete_episodes() {
+    let mut replay = Replay::new(SHAPE, 1);
+    assert_eq!(replay.typical_reward(10), None);
+    for (episode, reward) in [9.0, 1.0, 2.0].into_iter().enumerate() {
+        replay.begin_episode(0, episode as u64, &[0.0; 3], &[0.0], None);
+        for t in 0..4 {
+            let step = NewStep {
+                action: &[0.0, 0.0],
+                learned_reward: 0.0,
+                task_reward: TaskReward(reward),
+                success: false,
+                stage: None,
+                end: (t == 3).then_some(EpisodeEnd::TimeLimit),
+                next_observation: &[0.0; 3],
+                next_pose: &[0.0],
+            };
+            replay.push(0, step);
+        }
+    }
+    assert_eq!(replay.typical_reward(2), Some(TaskReward(1.5)));
+    assert_eq!(replay.typical_reward(10), Some(TaskReward(4.0)));
+}

@@ -13,7 +13,7 @@ const SHAPE: ReplayShape = ReplayShape {
 const EPISODE_LEN: u32 = 20;
 
 /// Random states and actions; the task reward is the first coordinate of the state.
-fn replay(n_episodes: u32) -> Replay {
+pub(super) fn replay(n_episodes: u32) -> Replay {
     let mut replay = Replay::new(SHAPE, 1);
     let mut rng = Rng::new(1, Stream::Test, 0);
     let mut normals = |n: usize| {
@@ -47,7 +47,7 @@ fn replay(n_episodes: u32) -> Replay {
 }
 
 /// Pairs of segments, labeled by the task reward, every seventh as equal.
-fn labeled(replay: &Replay, n: u32, len: impl Fn(u32) -> u32) -> Vec<Labeled> {
+pub(super) fn labeled(replay: &Replay, n: u32, len: impl Fn(u32) -> u32) -> Vec<Labeled> {
     let mut rng = Rng::new(2, Stream::Test, 0);
     let mut segment = |len: u32| Segment {
         episode: EpisodeId(rng.below(replay.n_episodes()) as u32),
@@ -83,7 +83,7 @@ fn labeled(replay: &Replay, n: u32, len: impl Fn(u32) -> u32) -> Vec<Labeled> {
         .collect()
 }
 
-fn small() -> RewardConfig {
+pub(super) fn small() -> RewardConfig {
     RewardConfig {
         members: 2,
         hidden: vec![16, 12],
@@ -98,13 +98,10 @@ fn the_written_out_gradient_is_autograds() {
     let replay = replay(6);
     let labeled = labeled(&replay, 14, |i| 4 + i % 3);
     let mut ours = RewardEnsemble::with_kind(&small(), (3, 2), 1, (Kind::Double, tch::Device::Cpu));
-    let pass = |order| Pass {
-        order,
-        loss: 0.0,
-        n_right: 0,
-        n_judged: 0,
-    };
-    let mut passes = vec![pass((0..14).collect()), pass((0..14).rev().collect())];
+    let mut passes = vec![
+        Pass::new((0..14).collect()),
+        Pass::new((0..14).rev().collect()),
+    ];
     ours.gradient(&replay, &labeled, &mut passes, 0..14);
 
     let flat = ours.parameters.values.copy().set_requires_grad(true);
@@ -239,4 +236,33 @@ fn swapped_segments_swap_the_probability() {
     }
     let std = disagreement(&[vec![0.2, 0.5], vec![0.6, 0.5]]);
     assert!((std[0] - 0.2).abs() < 1e-6 && std[1] == 0.0);
+    let unsure = entropy(&[vec![0.5, 1.0], vec![0.5, 0.5]]);
+    let ln_2 = std::f32::consts::LN_2;
+    assert!((unsure[0] - ln_2).abs() < 1e-6 && (unsure[1] - 0.5 * ln_2).abs() < 1e-6);
+}
+
+/// RUNE's bonus: 0 where all members agree, their standard deviation elsewhere.
+#[test]
+fn the_disagreement_about_a_reward_is_the_members_std_and_goes_to_the_replay() {
+    let mut replay = replay(2);
+    let twice = RewardConfig {
+        members: 1,
+        ..small()
+    };
+    let alone = RewardEnsemble::new(&twice, 3, 2, 1, Device::CPU);
+    let ensemble = RewardEnsemble::new(&small(), 3, 2, 1, Device::CPU);
+    let (id, t) = (EpisodeId(1), 7);
+    let (state, action) = (
+        replay.observation(id, t).to_vec(),
+        replay.action(id, t).to_vec(),
+    );
+    assert_eq!(alone.estimate(&state, &action).disagreements, [0.0]);
+    let rows = ensemble.input(&joined(&state, &action, 1));
+    let own = to_vec(&ensemble.net.forward(&rows).tanh());
+    let std = ensemble.estimate(&state, &action).disagreements[0];
+    assert!((std - 0.5 * (own[0] - own[1]).abs()).abs() < 1e-6);
+    replay.keep_disagreement();
+    ensemble.relabel(&mut replay);
+    let kept = replay.disagreements_mut(0)[EPISODE_LEN as usize + t];
+    assert!((kept - std).abs() < 1e-6, "{kept} {std}");
 }

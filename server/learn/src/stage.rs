@@ -1,0 +1,215 @@
+//! How far apart in the task the two segments of a query are, by the learned temporal distance
+//! or without it.
+
+use domain::episode::Segment;
+use domain::query::Query;
+use serde::{Deserialize, Serialize};
+
+use crate::replay::Replay;
+use crate::temporal::TemporalDistance;
+
+/// What stands for the stage of a state; smaller gaps are better aligned in each.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum StageApproximator {
+    /// Mean of the four temporal distances between the ends of both segments: STAIR, Eq. 8.
+    Quadrilateral,
+    /// The same, mean of both directions. The paper's runs from the first segment to the second.
+    SymmetricQuadrilateral,
+    /// A state's stage is its temporal distance from the start of its episode; segments are
+    /// intervals of stages. The paper's STAIR (ISR).
+    Intervals,
+    /// A state's stage is its step in its episode; segments are intervals of steps.
+    Timestep,
+}
+
+impl StageApproximator {
+    /// Whether somebody has to learn a temporal distance for it.
+    pub fn needs_temporal_distance(self) -> bool {
+        self != Self::Timestep
+    }
+
+    /// Gap of each query, `[N]`; nats for the quadrilaterals, [0, 1] for intervals. Empty
+    /// without the temporal distance that it needs.
+    ///
+    /// # Panics
+    /// When a segment is not in the replay.
+    pub fn gap(
+        self,
+        replay: &Replay,
+        temporal: Option<&TemporalDistance>,
+        queries: &[Query],
+    ) -> Vec<f32> {
+        match (self, temporal) {
+            (Self::Timestep, _) => {
+                let steps =
+                    |s: Segment| (s.start as f32, (s.start + s.len.saturating_sub(1)) as f32);
+                let gap = |q: &Query| interval_gap(steps(q.first), steps(q.second));
+                queries.iter().map(gap).collect()
+            }
+            (Self::Quadrilateral, Some(temporal)) => temporal.stage_gap(replay, queries),
+            (Self::SymmetricQuadrilateral, Some(temporal)) => {
+                let swapped: Vec<Query> = queries.iter().copied().map(swapped).collect();
+                let there = temporal.stage_gap(replay, queries);
+                let back = temporal.stage_gap(replay, &swapped);
+                let means = there.iter().zip(&back).map(|(a, b)| 0.5 * (a + b));
+                means.collect()
+            }
+            (Self::Intervals, Some(temporal)) => {
+                let gap = |q: &Query| {
+                    let [first, second] = [q.first, q.second].map(|s| stages(replay, temporal, s));
+                    interval_gap(first, second)
+                };
+                queries.iter().map(gap).collect()
+            }
+            (_, None) => Vec::new(),
+        }
+    }
+}
+
+fn swapped(query: Query) -> Query {
+    Query {
+        first: query.second,
+        second: query.first,
+    }
+}
+
+/// Smallest and largest distance from the episode's first state to a state of the segment.
+fn stages(replay: &Replay, temporal: &TemporalDistance, segment: Segment) -> (f32, f32) {
+    let (mut starts, mut states) = (Vec::new(), Vec::new());
+    for t in segment.start..segment.start + segment.len {
+        starts.extend_from_slice(replay.observation(segment.episode, 0));
+        states.extend_from_slice(replay.observation(segment.episode, t as usize));
+    }
+    let distances = temporal.distance(&starts, &states);
+    let lo = distances.iter().copied().fold(f32::INFINITY, f32::min);
+    (lo, distances.into_iter().fold(f32::NEG_INFINITY, f32::max))
+}
+
+/// (1 − gIoU)/2 of two intervals: 0 for equal ones, ½ for touching ones, towards 1 far apart.
+///
+/// Differs from the paper: its index (named ISR, and larger for better aligned segments) leaves
+/// (−1, 1] for nested intervals and is undefined for equal points; the generalised
+/// intersection over union agrees with it elsewhere.
+pub fn interval_gap(first: (f32, f32), second: (f32, f32)) -> f32 {
+    let hull = first.1.max(second.1) - first.0.min(second.0);
+    let overlap = first.1.min(second.1) - first.0.max(second.0);
+    if hull > 0.0 {
+        0.5 * (1.0 - overlap / hull)
+    } else {
+        0.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use domain::environment::{EpisodeEnd, TaskReward};
+    use domain::episode::EpisodeId;
+
+    use super::*;
+    use crate::device::Device;
+    use crate::replay::{NewStep, ReplayShape};
+    use crate::temporal::TemporalConfig;
+
+    fn query(first: (u32, u32), second: (u32, u32), len: u32) -> Query {
+        let segment = |(episode, start)| Segment {
+            episode: EpisodeId(episode),
+            start,
+            len,
+        };
+        Query {
+            first: segment(first),
+            second: segment(second),
+        }
+    }
+
+    /// Two episodes that walk along a line at different speeds.
+    fn replay() -> Replay {
+        let shape = ReplayShape {
+            observation: 2,
+            action: 1,
+            pose: 0,
+        };
+        let mut replay = Replay::new(shape, 1);
+        for episode in 0..2_u8 {
+            let state = |t: u8| [f32::from(t) * (1.0 + f32::from(episode)), 1.0];
+            replay.begin_episode(0, 0, &state(0), &[], None);
+            for t in 1..=30 {
+                let step = NewStep {
+                    action: &[0.0],
+                    learned_reward: 0.0,
+                    task_reward: TaskReward(0.0),
+                    success: false,
+                    stage: None,
+                    end: (t == 30).then_some(EpisodeEnd::TimeLimit),
+                    next_observation: &state(t),
+                    next_pose: &[],
+                };
+                replay.push(0, step);
+            }
+        }
+        replay
+    }
+
+    fn temporal() -> TemporalDistance {
+        let config = TemporalConfig {
+            hidden: vec![16],
+            latent: 8,
+            ..TemporalConfig::default()
+        };
+        TemporalDistance::new(&config, 2, 1, Device::CPU)
+    }
+
+    #[test]
+    fn intervals_are_equal_nested_touching_or_far_apart() {
+        let close = |a, b, expected: f32| (interval_gap(a, b) - expected).abs() < 1e-6;
+        assert!(close((1.0, 3.0), (1.0, 3.0), 0.0));
+        assert!(close((0.0, 10.0), (1.0, 2.0), 0.45)); // the paper's index would be 4.5
+        assert!(close((0.0, 1.0), (1.0, 2.0), 0.5));
+        assert!(close((0.0, 1.0), (9.0, 10.0), 0.9));
+        assert!(close((9.0, 10.0), (0.0, 1.0), 0.9));
+        assert!(close((2.0, 2.0), (2.0, 2.0), 0.0));
+    }
+
+    /// With H = 5, ISR = (4 − D)/(4 + D) for starts D apart.
+    #[test]
+    fn the_timestep_gap_ranks_by_the_distance_of_the_starts() {
+        let replay = replay();
+        let at = |start| query((0, 3), (1, start), 5);
+        let queries: Vec<Query> = [3, 4, 1, 9, 20].map(at).into();
+        let gaps = StageApproximator::Timestep.gap(&replay, None, &queries);
+        for (gap, apart) in gaps.iter().zip([0.0, 1.0, 2.0, 6.0, 17.0]) {
+            let index = (4.0 - apart) / (4.0 + apart);
+            assert!((gap - 0.5 * (1.0 - index)).abs() < 1e-6, "{gap} {apart}");
+        }
+        assert!(gaps.is_sorted());
+    }
+
+    #[test]
+    fn the_symmetric_gap_is_the_same_from_either_side_and_the_papers_is_not() {
+        let replay = replay();
+        let temporal = temporal();
+        let gap =
+            |how: StageApproximator, a, b| how.gap(&replay, Some(&temporal), &[query(a, b, 5)])[0];
+        let (a, b) = ((0, 2), (1, 20));
+        let both = |how| (gap(how, a, b), gap(how, b, a));
+        let (there, back) = both(StageApproximator::Quadrilateral);
+        assert!((there - back).abs() > 1e-4, "{there} {back}");
+        let (one, other) = both(StageApproximator::SymmetricQuadrilateral);
+        assert!((one - other).abs() < 1e-6 && (one - 0.5 * (there + back)).abs() < 1e-6);
+        let (one, other) = both(StageApproximator::Intervals);
+        assert!((one - other).abs() < 1e-6, "{one} {other}");
+        let nothing = StageApproximator::Intervals.gap(&replay, None, &[query(a, b, 5)]);
+        assert!(nothing.is_empty());
+    }
+
+    /// One state after another lies farther from the start, so nearer segments have smaller gaps.
+    #[test]
+    fn intervals_of_a_segment_with_itself_have_no_gap() {
+        let replay = replay();
+        let temporal = temporal();
+        let queries = [query((0, 3), (0, 3), 5), query((0, 3), (0, 20), 5)];
+        let gaps = StageApproximator::Intervals.gap(&replay, Some(&temporal), &queries);
+        assert!(gaps[0].abs() < 1e-6 && gaps[1] > 0.1, "{gaps:?}");
+    }
+}
