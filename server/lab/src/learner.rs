@@ -203,6 +203,11 @@ impl Learner {
         }
     }
 
+    /// Lets the agent's learning rates fall with the part of the run that is behind, [0, 1].
+    pub(crate) fn anneal(&mut self, done: f64) {
+        self.agent.anneal(done);
+    }
+
     /// Actions sampled from the policy, `[n × A]`.
     pub(crate) fn act_exploring(&self, observations: &[f32], step: u64) -> Vec<f32> {
         self.agent.act(observations, Act::Sample { step })

@@ -309,6 +309,9 @@ impl Run {
                 self.checkpoint_and_say(events)?;
                 return Ok(Outcome::Stopped);
             }
+            let total_steps = self.config.training.total_steps;
+            self.learner
+                .anneal(self.progress.step as f64 / total_steps as f64);
             self.take_answers(teacher)?;
             if self.session_is_complete() {
                 self.learn_from_session(events)?;

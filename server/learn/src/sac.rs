@@ -45,6 +45,15 @@ pub struct SacConfig {
     pub critic_ema: f64,
     /// Updates between two movements of the target critics.
     pub target_every: u64,
+    /// How far the averaged actor, whose mean action is evaluated and kept, moves towards the
+    /// actor at each update, [0, 1]; 0 takes the actor itself, as the released code does.
+    ///
+    /// High rates make the last few updates decide where a mean action lies; an average over
+    /// some 1 / `actor_ema` updates lies where most of them agree.
+    pub actor_ema: f64,
+    /// Share of the learning rates that is left at the run's last step, (0, 1]: they fall in
+    /// a straight line. 1, the released code's, keeps them.
+    pub final_rate: f64,
     /// Whether the critics' hidden layers are normalised; the released code's are not. With it,
     /// higher learning rates hold.
     pub layer_norm: bool,
@@ -64,6 +73,8 @@ impl Default for SacConfig {
             initial_temperature: 0.1,
             critic_ema: 0.005,
             target_every: 2,
+            actor_ema: 0.0,
+            final_rate: 1.0,
             layer_norm: false,
             precision: Precision::F32,
         }
@@ -98,7 +109,8 @@ impl SacConfig {
 /// How the agent chooses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Act {
-    /// The policy's mean action: for evaluation.
+    /// The mean action of the policy, averaged over updates where the settings say so: for
+    /// evaluation.
     Mean,
     /// A sample, keyed by the environment step.
     Sample {
@@ -134,7 +146,9 @@ pub struct Sac {
     critic_shape: NetShape,
     target_values: Tensor,
     target: Net,
+    average: Option<Average>,
     temperature: Temperature,
+    rate: f64,
     n_updates: u64,
     n_critic_resets: u64,
 }
@@ -157,6 +171,12 @@ impl Trained {
             gradient,
         }
     }
+}
+
+/// A moving average of the actor.
+struct Average {
+    values: Tensor,
+    net: Net,
 }
 
 /// log α with its Adam, one number each.
@@ -222,15 +242,23 @@ impl Sac {
         let (actor_shape, critic_shape) = config.shapes(s, a);
         let critic = Trained::new(&critic_shape, config.critic_learning_rate, options);
         let target_values = critic.parameters.values.zeros_like();
+        let actor = Trained::new(&actor_shape, config.actor_learning_rate, options);
+        let average = (config.actor_ema > 0.0).then(|| {
+            let values = actor.parameters.values.zeros_like();
+            let net = Net::over(&actor_shape, &values, 0);
+            Average { values, net }
+        });
         let mut sac = Self {
             config: config.clone(),
             seed,
             options,
             observation_size: s,
             action_size: a,
-            actor: Trained::new(&actor_shape, config.actor_learning_rate, options),
+            actor,
             critic,
             target: Net::over(&critic_shape, &target_values, 0),
+            average,
+            rate: 1.0,
             critic_shape,
             target_values,
             temperature: Temperature {
@@ -246,6 +274,9 @@ impl Sac {
             &mut sac.actor.net,
             &mut Rng::new(seed, Stream::Weights, ACTOR),
         );
+        if let Some(average) = &mut sac.average {
+            average.values.copy_(&sac.actor.parameters.values);
+        }
         sac.init_critic();
         sac
     }
@@ -262,7 +293,11 @@ impl Sac {
     /// Actions in [−1, 1], `[n × A]`, for states `[n × S]`.
     pub fn act(&self, observations: &[f32], how: Act) -> Vec<f32> {
         let states = matrix(observations, self.observation_size, self.options);
-        let policy = Gaussian::new(&self.actor.net.forward(&states), self.action_size);
+        let net = match (how, &self.average) {
+            (Act::Mean, Some(average)) => &average.net,
+            _ => &self.actor.net,
+        };
+        let policy = Gaussian::new(&net.forward(&states), self.action_size);
         to_vec(&match how {
             Act::Mean => policy.mean_action(),
             Act::Sample { step } => {
@@ -288,13 +323,17 @@ impl Sac {
 
         let target = self.bellman_target(&rows, &next_noise, alpha);
         let (critic_loss, q_mean) = self.critic_gradient(&rows, &target);
-        self.critic.parameters.step();
+        self.critic.parameters.step_at(self.rate);
         let (actor_loss, entropy) = self.actor_gradient(&rows, &noise, alpha);
-        self.actor.parameters.step();
+        self.actor.parameters.step_at(self.rate);
+        if let Some(average) = &mut self.average {
+            let weight = self.config.actor_ema;
+            kernel::lerp(&mut average.values, &self.actor.parameters.values, weight);
+        }
         let target_entropy = -(self.action_size as f64);
         self.temperature.step(
             alpha * (entropy - target_entropy),
-            self.config.alpha_learning_rate,
+            self.rate * self.config.alpha_learning_rate,
         );
         if self
             .n_updates
@@ -323,27 +362,42 @@ impl Sac {
         self.critic.parameters.reset_moments();
     }
 
+    /// Lets the learning rates fall to [`SacConfig::final_rate`]; `done` is the part of the run
+    /// that is behind, [0, 1]. It follows from the step, so no checkpoint holds it.
+    pub fn anneal(&mut self, done: f64) {
+        self.rate = 1.0 + done.clamp(0.0, 1.0) * (self.config.final_rate - 1.0);
+    }
+
     /// Updates so far.
     pub fn n_updates(&self) -> u64 {
         self.n_updates
     }
 
-    /// The actor's weights alone: all that acting takes.
+    /// The weights that [`Act::Mean`] acts with, alone.
     pub fn save_policy(&self, archive: &mut Archive) {
-        save_tensor(&self.actor.parameters.values, ACTOR_SECTION, archive);
+        match &self.average {
+            Some(average) => save_tensor(&average.values, AVERAGE_SECTION, archive),
+            None => save_tensor(&self.actor.parameters.values, ACTOR_SECTION, archive),
+        }
     }
 
-    /// What [`Sac::save_policy`] or [`Sac::save`] wrote of the actor; all else stays as it is.
+    /// What [`Sac::save_policy`] or [`Sac::save`] wrote of them; all else stays as it is.
     ///
     /// # Errors
     /// When the section is missing or of another network.
     pub fn load_policy(&mut self, archive: &Archive) -> Result<(), LearnError> {
-        load_tensor(&mut self.actor.parameters.values, ACTOR_SECTION, archive)
+        match &mut self.average {
+            Some(average) => load_tensor(&mut average.values, AVERAGE_SECTION, archive),
+            None => load_tensor(&mut self.actor.parameters.values, ACTOR_SECTION, archive),
+        }
     }
 
     /// Weights, moments, temperature and counters.
     pub fn save(&self, archive: &mut Archive) {
         self.actor.parameters.save(ACTOR_SECTION, archive);
+        if let Some(average) = &self.average {
+            save_tensor(&average.values, AVERAGE_SECTION, archive);
+        }
         self.critic.parameters.save("sac.critic", archive);
         save_tensor(&self.target_values, "sac.target", archive);
         let t = &self.temperature;
@@ -360,6 +414,9 @@ impl Sac {
     /// When a section is missing or of another network; part of the agent may then be loaded.
     pub fn load(&mut self, archive: &Archive) -> Result<(), LearnError> {
         self.actor.parameters.load(ACTOR_SECTION, archive)?;
+        if let Some(average) = &mut self.average {
+            load_tensor(&mut average.values, AVERAGE_SECTION, archive)?;
+        }
         self.critic.parameters.load("sac.critic", archive)?;
         load_tensor(&mut self.target_values, "sac.target", archive)?;
         let [log_alpha, first, second] = archive.f64("sac.temperature")?;
@@ -453,6 +510,8 @@ impl Sac {
 
 /// Where the actor's weights lie in an archive.
 const ACTOR_SECTION: &str = "sac.actor";
+/// Where the averaged actor lies, if there is one.
+const AVERAGE_SECTION: &str = "sac.actor.average";
 /// Keys of initial weights: the actor, then the critics of each reset.
 const ACTOR: u64 = 0;
 const FIRST_CRITIC: u64 = 1_000;

@@ -193,6 +193,10 @@ fn fingerprint(sac: &Sac) -> String {
 
 #[test]
 fn an_interrupted_agent_goes_on_bit_for_bit() {
+    goes_on_bit_for_bit(&SacConfig {
+        actor_ema: 0.1,
+        ..small(true)
+    });
     for precision in [Precision::F32, Precision::Bf16] {
         goes_on_bit_for_bit(&SacConfig {
             precision,
@@ -286,4 +290,63 @@ fn finds_the_better_action(precision: Precision) {
     let sampled = sac.act(&[1.0; 8], Act::Sample { step: 3 });
     assert_eq!(sampled, sac.act(&[1.0; 8], Act::Sample { step: 3 }));
     assert_ne!(sampled, sac.act(&[1.0; 8], Act::Sample { step: 4 }));
+}
+
+#[test]
+fn the_mean_action_is_that_of_the_average_over_updates() {
+    let run = |actor_ema: f64| {
+        let config = SacConfig {
+            actor_ema,
+            ..small(true)
+        };
+        let mut sac = Sac::new(&config, SIZES.0, SIZES.1, 3, Device::CPU);
+        let state = batch(1, 99).observation;
+        let mut means = vec![sac.act(&state, Act::Mean)];
+        for step in 0..3 {
+            sac.update(&batch(20, step));
+            means.push(sac.act(&state, Act::Mean));
+        }
+        (sac, means)
+    };
+    let (_, own) = run(0.0);
+    let (_, same) = run(1.0);
+    assert_eq!(own, same, "a rate of 1 is the actor itself");
+    let (slow, still) = run(1e-9);
+    assert_eq!(still[0], own[0]);
+    for (a, b) in still[3].iter().zip(&own[0]) {
+        assert!((a - b).abs() < 1e-6, "hardly moved: {a} against {b}");
+    }
+    assert_ne!(own[3], own[0]);
+    let mut archive = Archive::new();
+    slow.save_policy(&mut archive);
+    let config = slow.config.clone();
+    let mut opened = Sac::new(&config, SIZES.0, SIZES.1, 8, Device::CPU);
+    opened.load_policy(&archive).unwrap();
+    let state = batch(1, 99).observation;
+    assert_eq!(opened.act(&state, Act::Mean), still[3]);
+}
+
+#[test]
+fn the_learning_rates_fall_in_a_straight_line() {
+    let config = SacConfig {
+        final_rate: 0.2,
+        ..small(false)
+    };
+    let moved = |done: f64| {
+        let mut sac = Sac::new(&config, SIZES.0, SIZES.1, 3, Device::CPU);
+        let before = to_vec(&sac.actor.parameters.values);
+        sac.anneal(done);
+        sac.update(&batch(20, 0));
+        let after = to_vec(&sac.actor.parameters.values);
+        let squares = before
+            .iter()
+            .zip(&after)
+            .map(|(a, b)| f64::from(a - b).powi(2));
+        squares.sum::<f64>().sqrt()
+    };
+    let whole = moved(0.0);
+    for (done, share) in [(0.5, 0.6), (1.0, 0.2), (3.0, 0.2)] {
+        // Adam's first step is its rate times the gradient's sign
+        assert!((moved(done) / whole - share).abs() < 1e-3, "{done}");
+    }
 }
