@@ -1,5 +1,5 @@
 //! Link arguments for libtorch, the revision for `stair --version`, and the files of `web/static`
-//! inside the program.
+//! and `assets/guidance` inside the program.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -13,6 +13,7 @@ fn main() {
     emit_link_arguments();
     emit_revision();
     embed_static_files();
+    embed_guidance();
 }
 
 /// `STAIR_REVISION`: the short commit, `+` where the tree differs from it, `unknown` outside git.
@@ -38,7 +39,23 @@ fn emit_revision() {
 
 /// Writes `static_files.rs`: `(path below web/static, bytes)` of every file, sorted by path.
 fn embed_static_files() {
-    let root = PathBuf::from(variable("CARGO_MANIFEST_DIR")).join("../../web/static");
+    embed("../../web/static", "static_files.rs", |name, file| {
+        let name = name.display().to_string();
+        format!("({name:?}, include_bytes!({file:?}) as &[u8])")
+    });
+}
+
+/// Writes `guidance.rs`: `(task, text)` of every file in `assets/guidance`.
+fn embed_guidance() {
+    embed("../../assets/guidance", "guidance.rs", |name, file| {
+        let task = name.with_extension("").display().to_string();
+        format!("({task:?}, include_str!({file:?}))")
+    });
+}
+
+/// Writes a table with an entry for every file below a folder, sorted by path.
+fn embed(folder: &str, table_name: &str, entry: impl Fn(&Path, &str) -> String) {
+    let root = PathBuf::from(variable("CARGO_MANIFEST_DIR")).join(folder);
     println!("cargo:rerun-if-changed={}", root.display());
     let mut files = Vec::new();
     collect(&root, &mut files);
@@ -47,16 +64,11 @@ fn embed_static_files() {
     for file in &files {
         println!("cargo:rerun-if-changed={}", file.display());
         let name = file.strip_prefix(&root).expect("found below the root");
-        writeln!(
-            table,
-            "    ({:?}, include_bytes!({:?}) as &[u8]),",
-            name.display().to_string(),
-            file.display().to_string()
-        )
-        .expect("writing to a string cannot fail");
+        writeln!(table, "    {},", entry(name, &file.display().to_string()))
+            .expect("writing to a string cannot fail");
     }
     table.push_str("]\n");
-    let out = PathBuf::from(variable("OUT_DIR")).join("static_files.rs");
+    let out = PathBuf::from(variable("OUT_DIR")).join(table_name);
     std::fs::write(&out, table).expect("cargo's output folder can be written");
 }
 

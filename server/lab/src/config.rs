@@ -3,9 +3,8 @@
 //! Resolved once and saved with the run, so that any figure can be made again from it.
 
 use serde::{Deserialize, Serialize};
-use toml::{Table, Value};
 
-use domain::sampler::{SAMPLERS, SamplerSettings, StageCoefficients, sampler};
+use domain::sampler::{SamplerSettings, StageCoefficients};
 use domain::schedule::FeedbackSchedule;
 use domain::teacher::TeacherSettings;
 use learn::exploration::{BonusConfig, ExplorationConfig};
@@ -13,8 +12,15 @@ use learn::reward::{DenoisingConfig, RewardConfig, SemiSupervisedConfig, Steerin
 use learn::sac::SacConfig;
 use learn::temporal::TemporalConfig;
 
-use crate::method;
 use crate::nearest::nearest;
+
+mod check;
+mod layers;
+mod presets;
+
+pub use layers::Layers;
+use layers::{invalid, parse_layer};
+pub use presets::PRESETS;
 
 /// Everything that decides what a run does.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -272,270 +278,7 @@ fn hint(nearest: Option<&String>) -> String {
         .unwrap_or_default()
 }
 
-/// Where settings come from, least important first.
-#[derive(Debug, Clone, Default)]
-pub struct Layers {
-    /// A task's name.
-    pub task: Option<String>,
-    /// A method's name.
-    pub method: Option<String>,
-    /// Presets on top of the task's and the method's own: `quick`.
-    pub presets: Vec<String>,
-    /// A file's name and text.
-    pub file: Option<(String, String)>,
-    /// `key.path=value`, values in TOML's notation (bare words are strings).
-    pub overrides: Vec<String>,
-}
-
-/// `(name, task or "", text)` of every preset in the program.
-pub const PRESETS: &[(&str, &str, &str)] = &[
-    (
-        "sac",
-        "",
-        include_str!("../../../assets/presets/method/sac.toml"),
-    ),
-    (
-        "uniform",
-        "",
-        include_str!("../../../assets/presets/method/uniform.toml"),
-    ),
-    (
-        "pebble",
-        "",
-        include_str!("../../../assets/presets/method/pebble.toml"),
-    ),
-    (
-        "stair",
-        "",
-        include_str!("../../../assets/presets/method/stair.toml"),
-    ),
-    (
-        "stair_isr",
-        "",
-        include_str!("../../../assets/presets/method/stair_isr.toml"),
-    ),
-    (
-        "timestep",
-        "",
-        include_str!("../../../assets/presets/method/timestep.toml"),
-    ),
-    (
-        "rune",
-        "",
-        include_str!("../../../assets/presets/method/rune.toml"),
-    ),
-    (
-        "mrn",
-        "",
-        include_str!("../../../assets/presets/method/mrn.toml"),
-    ),
-    (
-        "rime",
-        "",
-        include_str!("../../../assets/presets/method/rime.toml"),
-    ),
-    (
-        "qpa",
-        "",
-        include_str!("../../../assets/presets/method/qpa.toml"),
-    ),
-    (
-        "surf",
-        "",
-        include_str!("../../../assets/presets/method/surf.toml"),
-    ),
-    (
-        "surf_whole",
-        "",
-        include_str!("../../../assets/presets/method/surf_whole.toml"),
-    ),
-    (
-        "task",
-        "door-open",
-        include_str!("../../../assets/presets/task/door-open.toml"),
-    ),
-    (
-        "task",
-        "door-unlock",
-        include_str!("../../../assets/presets/task/door-unlock.toml"),
-    ),
-    (
-        "task",
-        "drawer-open",
-        include_str!("../../../assets/presets/task/drawer-open.toml"),
-    ),
-    (
-        "task",
-        "faucet-open",
-        include_str!("../../../assets/presets/task/faucet-open.toml"),
-    ),
-    (
-        "task",
-        "go-fetch-return",
-        include_str!("../../../assets/presets/task/go-fetch-return.toml"),
-    ),
-    (
-        "task",
-        "sweep-into",
-        include_str!("../../../assets/presets/task/sweep-into.toml"),
-    ),
-    (
-        "task",
-        "window-close",
-        include_str!("../../../assets/presets/task/window-close.toml"),
-    ),
-    (
-        "task",
-        "window-open",
-        include_str!("../../../assets/presets/task/window-open.toml"),
-    ),
-    (
-        "task",
-        "push-green",
-        include_str!("../../../assets/presets/task/push-green.toml"),
-    ),
-    (
-        "task",
-        "walker-run",
-        include_str!("../../../assets/presets/task/walker-run.toml"),
-    ),
-    (
-        "task",
-        "quadruped-walk",
-        include_str!("../../../assets/presets/task/quadruped-walk.toml"),
-    ),
-    (
-        "task",
-        "quadruped-run",
-        include_str!("../../../assets/presets/task/quadruped-run.toml"),
-    ),
-    (
-        "task",
-        "cheetah-run",
-        include_str!("../../../assets/presets/task/cheetah-run.toml"),
-    ),
-    (
-        "quick",
-        "door-open",
-        include_str!("../../../assets/presets/quick/door-open.toml"),
-    ),
-    (
-        "quick",
-        "door-unlock",
-        include_str!("../../../assets/presets/quick/door-unlock.toml"),
-    ),
-    (
-        "quick",
-        "drawer-open",
-        include_str!("../../../assets/presets/quick/drawer-open.toml"),
-    ),
-    (
-        "quick",
-        "faucet-open",
-        include_str!("../../../assets/presets/quick/faucet-open.toml"),
-    ),
-    (
-        "paper_table",
-        "",
-        include_str!("../../../assets/presets/paper_table.toml"),
-    ),
-    (
-        "quick",
-        "go-fetch-return",
-        include_str!("../../../assets/presets/quick/go-fetch-return.toml"),
-    ),
-    (
-        "quick",
-        "sweep-into",
-        include_str!("../../../assets/presets/quick/sweep-into.toml"),
-    ),
-    (
-        "quick",
-        "window-close",
-        include_str!("../../../assets/presets/quick/window-close.toml"),
-    ),
-    (
-        "quick",
-        "window-open",
-        include_str!("../../../assets/presets/quick/window-open.toml"),
-    ),
-    (
-        "quick",
-        "push-green",
-        include_str!("../../../assets/presets/quick/push-green.toml"),
-    ),
-    (
-        "quick",
-        "walker-run",
-        include_str!("../../../assets/presets/quick/walker-run.toml"),
-    ),
-    (
-        "quick",
-        "quadruped-walk",
-        include_str!("../../../assets/presets/quick/quadruped-walk.toml"),
-    ),
-    (
-        "quick",
-        "quadruped-run",
-        include_str!("../../../assets/presets/quick/quadruped-run.toml"),
-    ),
-    (
-        "quick",
-        "cheetah-run",
-        include_str!("../../../assets/presets/quick/cheetah-run.toml"),
-    ),
-];
-
 impl RunConfig {
-    /// Resolves layers into one checked tree.
-    ///
-    /// # Errors
-    /// [`ConfigError`] names the layer, the key or line, and the nearest right name.
-    pub fn resolve(layers: &Layers) -> Result<Self, ConfigError> {
-        let file = layers
-            .file
-            .as_ref()
-            .map(|(name, text)| parse_layer(name, text))
-            .transpose()?;
-        let overrides = layers
-            .overrides
-            .iter()
-            .map(|o| parse_override(o))
-            .collect::<Result<Vec<_>, _>>()?;
-        let mut chosen = Table::new();
-        for layer in file.iter().chain(&overrides) {
-            merge(&mut chosen, layer);
-        }
-        let named = |key: &str, option: &Option<String>| {
-            option
-                .clone()
-                .or_else(|| chosen.get(key).and_then(Value::as_str).map(str::to_owned))
-        };
-        let task = named("task", &layers.task).unwrap_or_else(|| Self::default().task);
-        let method = named("method", &layers.method).unwrap_or_else(|| Self::default().method);
-        find_task(&task)?;
-        method::find(&method)?;
-
-        let mut tree = Table::new();
-        let preset_names = ["task", method.as_str()]
-            .into_iter()
-            .chain(layers.presets.iter().map(String::as_str));
-        for name in preset_names {
-            merge(&mut tree, &preset(name, &task)?);
-        }
-        merge(&mut tree, &chosen);
-        tree.insert("task".into(), Value::String(task));
-        tree.insert("method".into(), Value::String(method));
-        let config: Self = tree
-            .try_into()
-            .map_err(|e: toml::de::Error| ConfigError::Invalid {
-                origin: "settings".into(),
-                message: e.message().to_owned(),
-            })?;
-        config.check()?;
-        Ok(config)
-    }
-
     /// Reads the tree that a run saved.
     ///
     /// # Errors
@@ -568,11 +311,15 @@ impl RunConfig {
     /// its value here and there.
     pub(crate) fn first_misfit(&self, other: &Self) -> Option<(&'static str, String, String)> {
         type Describe = fn(&RunConfig) -> String;
-        let deciding: [(&str, Describe); 8] = [
+        let deciding: [(&str, Describe); 9] = [
             ("task", |c| c.task.clone()),
             ("environment.n_envs", |c| c.environment.n_envs.to_string()),
             ("agent.hidden", |c| format!("{:?}", c.agent.hidden)),
             ("agent.layer_norm", |c| c.agent.layer_norm.to_string()),
+            ("agent.actor_ema", |c| {
+                let is_averaged = c.agent.actor_ema > 0.0;
+                if is_averaged { "above 0" } else { "0" }.into()
+            }),
             ("reward.members", |c| c.reward.members.to_string()),
             ("reward.hidden", |c| format!("{:?}", c.reward.hidden)),
             ("temporal.hidden", |c| format!("{:?}", c.temporal.hidden)),
@@ -582,219 +329,6 @@ impl RunConfig {
             let (own, others) = (of(self), of(other));
             (own != others).then_some((key, own, others))
         })
-    }
-
-    fn check(&self) -> Result<(), ConfigError> {
-        let task = find_task(&self.task)?;
-        method::find(&self.method)?;
-        let out = |key, value: String, must_be| {
-            Err(ConfigError::OutOfRange {
-                key,
-                value,
-                must_be,
-            })
-        };
-        let (t, q, f) = (&self.training, &self.queries, &self.feedback);
-        if !(1..=256).contains(&self.environment.n_envs) {
-            return out(
-                "environment.n_envs",
-                self.environment.n_envs.to_string(),
-                "from 1 to 256",
-            );
-        }
-        if !(t.updates_per_step >= 0.0 && t.updates_per_step <= 64.0) {
-            return out(
-                "training.updates_per_step",
-                t.updates_per_step.to_string(),
-                "from 0 to 64",
-            );
-        }
-        if !(t.task_reward_scale > 0.0 && t.task_reward_scale.is_finite()) {
-            return out(
-                "training.task_reward_scale",
-                t.task_reward_scale.to_string(),
-                "above 0",
-            );
-        }
-        if t.total_steps == 0 {
-            return out("training.total_steps", "0".into(), "at least 1");
-        }
-        if f.first_step <= t.seed_steps {
-            return out(
-                "feedback.first_step",
-                f.first_step.to_string(),
-                "above training.seed_steps",
-            );
-        }
-        if f.queries_per_session == 0 {
-            return out("feedback.queries_per_session", "0".into(), "at least 1");
-        }
-        if f.every == 0 {
-            return out("feedback.every", "0".into(), "at least 1 step");
-        }
-        if !(0.0..=1.0).contains(&q.same_stage_fraction) {
-            return out(
-                "queries.same_stage_fraction",
-                q.same_stage_fraction.to_string(),
-                "from 0 to 1",
-            );
-        }
-        if !(q.sufficient_fraction > 0.0 && q.sufficient_fraction <= 1.0) {
-            return out(
-                "queries.sufficient_fraction",
-                q.sufficient_fraction.to_string(),
-                "above 0, at most 1",
-            );
-        }
-        if q.candidates_per_query == 0 {
-            return out("queries.candidates_per_query", "0".into(), "at least 1");
-        }
-        if q.near_policy_episodes == 0 {
-            return out("queries.near_policy_episodes", "0".into(), "at least 1");
-        }
-        if !q.sampler.is_empty() && sampler(&q.sampler, &q.sampler_settings()).is_none() {
-            let known = SAMPLERS.iter().map(|(name, _)| *name);
-            return Err(unknown("sampler", &q.sampler, known));
-        }
-        self.check_teacher()?;
-        self.check_methods()?;
-        if q.newest_episodes == 0 {
-            return out("queries.newest_episodes", "0".into(), "at least 1");
-        }
-        if self.evaluation.episodes == 0 {
-            return out("evaluation.episodes", "0".into(), "at least 1");
-        }
-        if q.segment_len > (task.spec)().episode_len {
-            return out(
-                "queries.segment_len",
-                q.segment_len.to_string(),
-                "at most an episode's length",
-            );
-        }
-        self.check_sizes()
-    }
-
-    /// Of networks and of what they are given at once.
-    fn check_sizes(&self) -> Result<(), ConfigError> {
-        let out = |key, value: String, must_be| {
-            Err(ConfigError::OutOfRange {
-                key,
-                value,
-                must_be,
-            })
-        };
-        let sizes = [
-            ("agent.hidden", &self.agent.hidden),
-            ("reward.hidden", &self.reward.hidden),
-            ("temporal.hidden", &self.temporal.hidden),
-        ];
-        for (key, sizes) in sizes {
-            if sizes.len() > 16 || sizes.iter().any(|n| !(1..=65_536).contains(n)) {
-                let must_be = "at most 16 layers of 1 to 65536";
-                return out(key, format!("{sizes:?}"), must_be);
-            }
-        }
-        let batches = [
-            ("agent.batch", self.agent.batch),
-            ("reward.batch", self.reward.batch),
-            ("temporal.batch", self.temporal.batch),
-        ];
-        for (key, batch) in batches {
-            if !(1..=1_000_000).contains(&batch) {
-                return out(key, batch.to_string(), "from 1 to 1000000");
-            }
-        }
-        if !(1..=64).contains(&self.reward.members) {
-            return out(
-                "reward.members",
-                self.reward.members.to_string(),
-                "from 1 to 64",
-            );
-        }
-        if !(1..=65_536).contains(&self.temporal.latent) {
-            return out(
-                "temporal.latent",
-                self.temporal.latent.to_string(),
-                "from 1 to 65536",
-            );
-        }
-        Ok(())
-    }
-}
-
-impl RunConfig {
-    /// What single methods read.
-    fn check_methods(&self) -> Result<(), ConfigError> {
-        let (b, d, s) = (&self.bonus, &self.denoising, &self.semi_supervised);
-        let shares = [
-            ("bonus.decay", b.decay, 0.0..1.0),
-            ("denoising.flip_below", d.flip_below, 1e-12..0.5),
-            ("semi_supervised.certainty", s.certainty, 0.5..1.0),
-        ];
-        for (key, value, range) in shares {
-            if !range.contains(&value) {
-                return Err(ConfigError::OutOfRange {
-                    key,
-                    value: value.to_string(),
-                    must_be: "a share: bonus.decay in [0, 1), flip_below in (0, 0.5), \
-                              certainty in [0.5, 1)",
-                });
-            }
-        }
-        let weights = [
-            ("bonus.initial", b.initial),
-            ("steering.weight", self.steering.weight),
-            ("denoising.slack", d.slack),
-            ("denoising.doubt", d.doubt),
-            ("denoising.least_doubt", d.least_doubt),
-            ("semi_supervised.weight", s.weight),
-        ];
-        for (key, value) in weights {
-            if !(value >= 0.0 && value.is_finite()) {
-                return Err(ConfigError::OutOfRange {
-                    key,
-                    value: value.to_string(),
-                    must_be: "a number from 0 on",
-                });
-            }
-        }
-        if s.passes == 0 {
-            return Err(ConfigError::OutOfRange {
-                key: "semi_supervised.passes",
-                value: "0".into(),
-                must_be: "at least 1",
-            });
-        }
-        Ok(())
-    }
-
-    fn check_teacher(&self) -> Result<(), ConfigError> {
-        let t = &self.teacher;
-        let shares = [
-            ("teacher.mistake", t.mistake),
-            ("teacher.inconsistent_mistake", t.inconsistent_mistake),
-            ("teacher.equal", t.equal),
-            ("teacher.skip", t.skip),
-        ];
-        let out = |key, value: f64, must_be| {
-            Err(ConfigError::OutOfRange {
-                key,
-                value: value.to_string(),
-                must_be,
-            })
-        };
-        for (key, value) in shares {
-            if !(0.0..=1.0).contains(&value) {
-                return out(key, value, "from 0 to 1");
-            }
-        }
-        if !(t.discount > 0.0 && t.discount <= 1.0) {
-            return out("teacher.discount", t.discount, "above 0, at most 1");
-        }
-        if !(t.rationality > 0.0 && t.rationality.is_finite()) {
-            return out("teacher.rationality", t.rationality, "a number above 0");
-        }
-        Ok(())
     }
 }
 
@@ -822,82 +356,10 @@ pub(crate) fn unknown<'a>(
     }
 }
 
-fn preset(name: &str, task: &str) -> Result<Table, ConfigError> {
-    let found = PRESETS
-        .iter()
-        .find(|(n, t, _)| *n == name && (t.is_empty() || *t == task));
-    let Some((_, _, text)) = found else {
-        let mut known: Vec<&str> = PRESETS
-            .iter()
-            .map(|(n, _, _)| *n)
-            .filter(|n| *n != "task")
-            .collect();
-        known.dedup();
-        return Err(unknown("preset", name, known.into_iter()));
-    };
-    parse_layer(&format!("preset {name}"), text)
-}
-
-/// Parses one layer alone, so that an error can point into its own text.
-fn parse_layer(origin: &str, text: &str) -> Result<Table, ConfigError> {
-    toml::from_str::<RunConfig>(text).map_err(|e| invalid(origin, text, &e))?;
-    toml::from_str(text).map_err(|e| invalid(origin, text, &e))
-}
-
-fn parse_override(text: &str) -> Result<Table, ConfigError> {
-    let origin = format!("--set {text}");
-    let Some((key, value)) = text.split_once('=') else {
-        return Err(ConfigError::Invalid {
-            origin,
-            message: "write it as key=value".into(),
-        });
-    };
-    let is_bare = toml::from_str::<Table>(&format!("x = {value}")).is_err();
-    let value = if is_bare {
-        format!("{value:?}")
-    } else {
-        value.to_owned()
-    };
-    parse_layer(&origin, &format!("{key} = {value}"))
-}
-
-fn invalid(origin: &str, text: &str, error: &toml::de::Error) -> ConfigError {
-    let line = error
-        .span()
-        .map(|span| 1 + text[..span.start.min(text.len())].matches('\n').count());
-    let place = line
-        .map(|line| format!("line {line}: "))
-        .unwrap_or_default();
-    let message = error.message();
-    // serde's words are: unknown field `x`, expected one of `a`, `b`
-    let quoted: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
-    let suggestion = match quoted.split_first() {
-        Some((wrong, known)) if message.starts_with("unknown") => nearest(wrong, known),
-        _ => None,
-    };
-    let suggestion = suggestion
-        .map(|s| format!(" (did you mean `{s}`?)"))
-        .unwrap_or_default();
-    ConfigError::Invalid {
-        origin: origin.into(),
-        message: format!("{place}{message}{suggestion}"),
-    }
-}
-
-fn merge(base: &mut Table, layer: &Table) {
-    for (key, value) in layer {
-        match (base.get_mut(key), value) {
-            (Some(Value::Table(below)), Value::Table(above)) => merge(below, above),
-            _ => {
-                base.insert(key.clone(), value.clone());
-            }
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::method;
 
     fn layers(presets: &[&str], overrides: &[&str]) -> Layers {
         Layers {
@@ -979,6 +441,8 @@ mod tests {
             "queries.same_stage_fraction=1.5",
             "queries.sampler=disagrement",
             "queries.near_policy_episodes=0",
+            "agent.actor_ema=1.5",
+            "agent.final_rate=0.0",
             "teacher.mistake=1.5",
             "teacher.discount=0.0",
             "bonus.decay=1.0",

@@ -7,61 +7,8 @@ use std::fmt::Write as _;
 use askama::filters::{Escaper as _, Html};
 use sha2::{Digest as _, Sha256};
 
-/// `(task, text)`.
-const TEXTS: &[(&str, &str)] = &[
-    (
-        "door-open",
-        include_str!("../../../../assets/guidance/door-open.md"),
-    ),
-    (
-        "door-unlock",
-        include_str!("../../../../assets/guidance/door-unlock.md"),
-    ),
-    (
-        "drawer-open",
-        include_str!("../../../../assets/guidance/drawer-open.md"),
-    ),
-    (
-        "faucet-open",
-        include_str!("../../../../assets/guidance/faucet-open.md"),
-    ),
-    (
-        "go-fetch-return",
-        include_str!("../../../../assets/guidance/go-fetch-return.md"),
-    ),
-    (
-        "push-green",
-        include_str!("../../../../assets/guidance/push-green.md"),
-    ),
-    (
-        "sweep-into",
-        include_str!("../../../../assets/guidance/sweep-into.md"),
-    ),
-    (
-        "window-close",
-        include_str!("../../../../assets/guidance/window-close.md"),
-    ),
-    (
-        "window-open",
-        include_str!("../../../../assets/guidance/window-open.md"),
-    ),
-    (
-        "walker-run",
-        include_str!("../../../../assets/guidance/walker-run.md"),
-    ),
-    (
-        "quadruped-walk",
-        include_str!("../../../../assets/guidance/quadruped-walk.md"),
-    ),
-    (
-        "quadruped-run",
-        include_str!("../../../../assets/guidance/quadruped-run.md"),
-    ),
-    (
-        "cheetah-run",
-        include_str!("../../../../assets/guidance/cheetah-run.md"),
-    ),
-];
+/// `(task, text)` of every file in `assets/guidance`.
+const TEXTS: &[(&str, &str)] = include!(concat!(env!("OUT_DIR"), "/guidance.rs"));
 
 /// For a task whose text is not written yet.
 const ANY: &str = "Say which clip does better at the task that is named above.\n";

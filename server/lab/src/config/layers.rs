@@ -1,0 +1,131 @@
+//! From layers of TOML to one checked tree.
+
+use toml::{Table, Value};
+
+use super::presets::preset;
+use super::{ConfigError, RunConfig, find_task};
+use crate::method;
+use crate::nearest::nearest;
+
+/// Where settings come from, least important first.
+#[derive(Debug, Clone, Default)]
+pub struct Layers {
+    /// A task's name.
+    pub task: Option<String>,
+    /// A method's name.
+    pub method: Option<String>,
+    /// Presets on top of the task's and the method's own: `quick`.
+    pub presets: Vec<String>,
+    /// A file's name and text.
+    pub file: Option<(String, String)>,
+    /// `key.path=value`, values in TOML's notation (bare words are strings).
+    pub overrides: Vec<String>,
+}
+
+impl RunConfig {
+    /// Resolves layers into one checked tree.
+    ///
+    /// # Errors
+    /// [`ConfigError`] names the layer, the key or line, and the nearest right name.
+    pub fn resolve(layers: &Layers) -> Result<Self, ConfigError> {
+        let file = layers
+            .file
+            .as_ref()
+            .map(|(name, text)| parse_layer(name, text))
+            .transpose()?;
+        let overrides = layers
+            .overrides
+            .iter()
+            .map(|o| parse_override(o))
+            .collect::<Result<Vec<_>, _>>()?;
+        let mut chosen = Table::new();
+        for layer in file.iter().chain(&overrides) {
+            merge(&mut chosen, layer);
+        }
+        let named = |key: &str, option: &Option<String>| {
+            option
+                .clone()
+                .or_else(|| chosen.get(key).and_then(Value::as_str).map(str::to_owned))
+        };
+        let task = named("task", &layers.task).unwrap_or_else(|| Self::default().task);
+        let method = named("method", &layers.method).unwrap_or_else(|| Self::default().method);
+        find_task(&task)?;
+        method::find(&method)?;
+
+        let mut tree = Table::new();
+        let preset_names = ["task", method.as_str()]
+            .into_iter()
+            .chain(layers.presets.iter().map(String::as_str));
+        for name in preset_names {
+            merge(&mut tree, &preset(name, &task)?);
+        }
+        merge(&mut tree, &chosen);
+        tree.insert("task".into(), Value::String(task));
+        tree.insert("method".into(), Value::String(method));
+        let config: Self = tree
+            .try_into()
+            .map_err(|e: toml::de::Error| ConfigError::Invalid {
+                origin: "settings".into(),
+                message: e.message().to_owned(),
+            })?;
+        config.check()?;
+        Ok(config)
+    }
+}
+
+/// Parses one layer alone, so that an error can point into its own text.
+pub(super) fn parse_layer(origin: &str, text: &str) -> Result<Table, ConfigError> {
+    toml::from_str::<RunConfig>(text).map_err(|e| invalid(origin, text, &e))?;
+    toml::from_str(text).map_err(|e| invalid(origin, text, &e))
+}
+
+fn parse_override(text: &str) -> Result<Table, ConfigError> {
+    let origin = format!("--set {text}");
+    let Some((key, value)) = text.split_once('=') else {
+        return Err(ConfigError::Invalid {
+            origin,
+            message: "write it as key=value".into(),
+        });
+    };
+    let is_bare = toml::from_str::<Table>(&format!("x = {value}")).is_err();
+    let value = if is_bare {
+        format!("{value:?}")
+    } else {
+        value.to_owned()
+    };
+    parse_layer(&origin, &format!("{key} = {value}"))
+}
+
+pub(super) fn invalid(origin: &str, text: &str, error: &toml::de::Error) -> ConfigError {
+    let line = error
+        .span()
+        .map(|span| 1 + text[..span.start.min(text.len())].matches('\n').count());
+    let place = line
+        .map(|line| format!("line {line}: "))
+        .unwrap_or_default();
+    let message = error.message();
+    // serde's words are: unknown field `x`, expected one of `a`, `b`
+    let quoted: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
+    let suggestion = match quoted.split_first() {
+        Some((wrong, known)) if message.starts_with("unknown") => nearest(wrong, known),
+        _ => None,
+    };
+    let suggestion = suggestion
+        .map(|s| format!(" (did you mean `{s}`?)"))
+        .unwrap_or_default();
+    ConfigError::Invalid {
+        origin: origin.into(),
+        message: format!("{place}{message}{suggestion}"),
+    }
+}
+
+fn merge(base: &mut Table, layer: &Table) {
+    for (key, value) in layer {
+        match (base.get_mut(key), value) {
+            (Some(Value::Table(below)), Value::Table(above)) => merge(below, above),
+            _ => {
+                base.insert(key.clone(), value.clone());
+            }
+        }
+    }
+}
