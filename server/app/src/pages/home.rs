@@ -74,8 +74,12 @@ struct RunLine {
     id: String,
     /// The task's title.
     title: String,
-    /// `STAIR, seed 1, begun 2026-05-02 14:02 UTC`: tells equal runs apart.
+    /// `STAIR, seed 1, begun `: with the time after it, tells equal runs apart.
     details: String,
+    /// RFC 3339, from which a script makes the reader's own time.
+    begun_at: String,
+    /// `2026-05-02 14:02 UTC`.
+    begun: String,
     /// Kind of state, for colour.
     state: String,
     /// State in a few words.
@@ -178,13 +182,13 @@ fn run_line(run: RunView) -> RunLine {
     RunLine {
         id: run.id.to_string(),
         title: title(&run.task).to_owned(),
-        details: format!(
-            "{}, seed {}, begun {} {} UTC",
-            method_name(&run.method),
-            run.seed,
+        details: format!("{}, seed {}, begun ", method_name(&run.method), run.seed),
+        begun: format!(
+            "{} {} UTC",
             run.created_at.get(..10).unwrap_or_default(),
             run.created_at.get(11..16).unwrap_or_default()
         ),
+        begun_at: run.created_at.clone(),
         can_label: run.can_label(),
         state: run.state.kind,
         message: run.state.message,
@@ -310,6 +314,8 @@ mod tests {
             id: String::new(),
             title: String::new(),
             details: String::new(),
+            begun_at: String::new(),
+            begun: String::new(),
             state: state.to_owned(),
             message: String::new(),
             labels: String::new(),
