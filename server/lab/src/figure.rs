@@ -8,6 +8,7 @@ use serde::de::DeserializeOwned;
 use crate::config::{ConfigError, unknown};
 
 mod abstract_mdp;
+mod chart;
 mod curves;
 mod plot;
 mod preference_fit;
@@ -17,10 +18,15 @@ mod query_counts;
 mod rows;
 mod same_stage_bars;
 mod seeds;
+mod stage_gaps;
 mod stage_map;
 
 pub use preferences::{PreferenceRow, Preferred};
 pub use rows::{CurveRow, rows_of_run};
+pub use stage_gaps::SessionRow;
+
+pub(crate) use chart::csv_cell;
+pub(crate) use seeds::in_order_of_appearance;
 
 /// A file of results, read: JSON Lines.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -44,6 +50,9 @@ pub struct Request<'a> {
     pub center: Option<&'a str>,
 }
 
+/// From rows to the text of a figure.
+pub type Make = fn(&Request) -> Result<String, FigureError>;
+
 /// A line of the registry.
 pub struct FigureEntry {
     /// As users type it.
@@ -55,12 +64,15 @@ pub struct FigureEntry {
     /// The choices it leaves, of `x`, `y` and `center`.
     pub choices: &'static [&'static str],
     /// Draws it.
-    pub make: fn(&Request) -> Result<String, FigureError>,
+    pub make: Make,
+    /// Lists every drawn point as CSV, where the figure can.
+    pub list: Option<Make>,
 }
 
 /// All figures.
 pub const FIGURES: &[FigureEntry] = &[
     curves::ENTRY,
+    stage_gaps::ENTRY,
     abstract_mdp::ENTRY,
     query_counts::ENTRY,
     preference_scatter::ENTRY,
@@ -131,6 +143,26 @@ pub fn find(name: &str) -> Result<&'static FigureEntry, FigureError> {
 /// # Errors
 /// When a row is not one, there are none, or a choice does not exist.
 pub fn make(figure: &'static FigureEntry, request: &Request) -> Result<String, FigureError> {
+    check_choices(figure, request)?;
+    (figure.make)(request)
+}
+
+/// Lists every point of a figure as CSV.
+///
+/// # Errors
+/// As [`make`], and where the figure has no list.
+pub fn list(figure: &'static FigureEntry, request: &Request) -> Result<String, FigureError> {
+    check_choices(figure, request)?;
+    match figure.list {
+        Some(list) => list(request),
+        None => Err(FigureError::Misfit(format!(
+            "{} cannot be listed as CSV; its rows say all that it draws",
+            figure.name
+        ))),
+    }
+}
+
+fn check_choices(figure: &'static FigureEntry, request: &Request) -> Result<(), FigureError> {
     let choices = [
         ("x", request.x),
         ("y", request.y),
@@ -144,7 +176,7 @@ pub fn make(figure: &'static FigureEntry, request: &Request) -> Result<String, F
             });
         }
     }
-    (figure.make)(request)
+    Ok(())
 }
 
 /// The rows of all sources, in order; empty lines are skipped.

@@ -15,6 +15,7 @@ pub(super) const ENTRY: FigureEntry = FigureEntry {
     input: "task, method, same (true or false); one judgement each",
     choices: &[],
     make,
+    list: None,
 };
 
 const LEVEL: f64 = 0.95;

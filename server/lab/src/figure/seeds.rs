@@ -41,14 +41,16 @@ pub(super) fn draw_seeds(
 }
 
 /// The centre of a group's seeds with its interval.
-struct Line {
-    center: Curve,
-    band: Vec<(f64, f64, f64)>,
+pub(super) struct Line {
+    /// Left to right.
+    pub(super) center: Curve,
+    /// Place, least and greatest.
+    pub(super) band: Vec<(f64, f64, f64)>,
 }
 
 impl Line {
     /// Where all seeds have been evaluated; straight lines between evaluations.
-    fn of(seeds: &[Curve], center: fn(&[f64]) -> f64) -> Self {
+    pub(super) fn of(seeds: &[Curve], center: fn(&[f64]) -> f64) -> Self {
         let mut line = Self {
             center: Vec::new(),
             band: Vec::new(),
@@ -91,7 +93,7 @@ fn interpolate(curve: &[(f64, f64)], x: f64) -> f64 {
 }
 
 /// Each value once.
-pub(super) fn in_order_of_appearance<T: PartialEq>(values: impl IntoIterator<Item = T>) -> Vec<T> {
+pub(crate) fn in_order_of_appearance<T: PartialEq>(values: impl IntoIterator<Item = T>) -> Vec<T> {
     let mut seen = Vec::new();
     for value in values {
         if !seen.contains(&value) {
