@@ -1,62 +1,68 @@
-//! `stair experiment`: the paper's experiments that need no simulation.
+//! `stair experiment`: grids of runs and what they came to, and the paper's experiments that need
+//! no simulation.
 
 use std::fmt::Write as _;
-use std::num::NonZeroUsize;
-use std::path::PathBuf;
 use std::process::ExitCode;
 
-use lab::experiment::{self, EXPERIMENTS, Settings};
+use clap::Subcommand;
+use lab::experiment::EXPERIMENTS;
 
-use super::BadInput;
-use super::figure::{Format, encode, write};
+mod check;
+mod folder;
+mod machine;
+mod progress;
+mod pure;
+mod report;
+mod run;
 
-/// Run an experiment that needs no simulation: rows, a table and a figure
+/// Run a grid of runs from a file and report on it, or an experiment that needs no simulation
 #[derive(Debug, clap::Args)]
-#[command(after_help = after_help())]
+#[command(
+    args_conflicts_with_subcommands = true,
+    subcommand_negates_reqs = true,
+    after_help = after_help()
+)]
 pub struct Args {
-    /// Which experiment
-    name: String,
-    /// Folder for what it makes
-    #[arg(long, value_name = "DIR")]
-    out: PathBuf,
-    /// Independent repetitions
-    #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u64).range(1..=10_000))]
-    seeds: u64,
-    /// Threads [default: one for each processor]; changes no number
-    #[arg(long)]
-    threads: Option<NonZeroUsize>,
+    #[command(subcommand)]
+    action: Option<Action>,
+    #[command(flatten)]
+    pure: Option<pure::Args>,
+}
+
+#[derive(Debug, Subcommand)]
+enum Action {
+    Check(check::Args),
+    Run(run::Args),
+    Report(report::Args),
 }
 
 fn after_help() -> String {
-    let mut text = "Experiments:\n".to_owned();
+    let mut text = "Experiments that need no simulation:\n".to_owned();
     for experiment in EXPERIMENTS {
         writeln!(text, "  {:14} {}", experiment.name, experiment.summary)
             .expect("writing to a string cannot fail");
     }
-    text.push_str("\nExamples:\n  stair experiment abstract-mdp --out results/abstract-mdp");
+    text.push_str(
+        "\nExamples:
+  stair experiment abstract-mdp --out results/abstract-mdp
+  stair experiment check assets/experiments/window.toml
+  stair experiment run assets/experiments/go-fetch-return.toml --small
+  stair experiment report data/experiments/go-fetch-return-small",
+    );
     text
 }
 
 /// Runs the command.
 ///
 /// # Errors
-/// [`BadInput`] for an unknown experiment; a folder that cannot be written.
+/// [`BadInput`](super::BadInput) for a file or name that does not fit; a folder that cannot be
+/// written.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
-    let experiment = experiment::find(&args.name).map_err(BadInput::from_error)?;
-    let processors = || std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
-    let settings = Settings {
-        n_seeds: args.seeds,
-        n_threads: args.threads.unwrap_or_else(processors),
-    };
-    for artifact in (experiment.run)(settings)? {
-        let path = args.out.join(artifact.name);
-        write(&path, artifact.text.as_bytes())?;
-        println!("{}", path.display());
-        if Format::of(&path).ok() == Some(Format::Svg) {
-            let picture = path.with_extension("png");
-            write(&picture, &encode(artifact.text, Format::Png, 2.0)?)?;
-            println!("{}", picture.display());
-        }
+    match (&args.action, &args.pure) {
+        (Some(Action::Check(args)), _) => check::run(args),
+        (Some(Action::Run(args)), _) => run::run(args),
+        (Some(Action::Report(args)), _) => report::run(args),
+        (None, Some(args)) => pure::run(args),
+        (None, None) => unreachable!("clap asks for a subcommand or a name"),
     }
-    Ok(ExitCode::SUCCESS)
 }

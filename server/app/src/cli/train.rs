@@ -62,6 +62,9 @@ pub struct Args {
     /// No progress bar; one JSON object at the end
     #[arg(long)]
     json: bool,
+    /// Stop at a checkpoint when standard input ends: for programs that start runs
+    #[arg(long)]
+    stop_at_eof: bool,
 }
 
 /// Runs the command.
@@ -77,6 +80,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let judge = judge(&args.teacher, run.config().seed, &run.config().teacher)?;
     let mut teacher = Scripted::new(judge, run.consumed_sequence());
     let (sender, commands) = channel();
+    if args.stop_at_eof {
+        stop_at_eof(sender.clone());
+    }
     stop_on_interrupt(sender)?;
     let started = Instant::now();
     let mut progress = Progress::new(&run, args.json);
@@ -196,8 +202,16 @@ pub(super) fn judge(
     })
 }
 
+fn stop_at_eof(sender: Sender<Command>) {
+    std::thread::spawn(move || {
+        let mut input = std::io::stdin().lock();
+        let _ = std::io::copy(&mut input, &mut std::io::sink()); // an error is an end as well
+        let _ = sender.send(Command::Stop); // a run that is over needs no telling
+    });
+}
+
 /// The first Ctrl-C leaves a checkpoint.
-fn stop_on_interrupt(sender: Sender<Command>) -> anyhow::Result<()> {
+pub(super) fn stop_on_interrupt(sender: Sender<Command>) -> anyhow::Result<()> {
     let runtime = tokio::runtime::Builder::new_current_thread()
         .enable_all()
         .build();

@@ -16,6 +16,8 @@ pub(in crate::cli) enum Format {
     Svg,
     /// Pixels.
     Png,
+    /// Every drawn point, where the figure can be listed.
+    Csv,
 }
 
 impl Format {
@@ -27,20 +29,21 @@ impl Format {
         match path.extension().and_then(|ending| ending.to_str()) {
             Some("svg") => Ok(Self::Svg),
             Some("png") => Ok(Self::Png),
+            Some("csv") => Ok(Self::Csv),
             _ => Err(BadInput(format!(
-                "{} must end in .svg or .png",
+                "{} must end in .svg, .png or .csv",
                 path.display()
             ))),
         }
     }
 }
 
-/// The bytes of the file. A PNG has `scale` pixels for each unit of the figure.
+/// The bytes of the file, from its text. A PNG has `scale` pixels for each unit of the figure.
 ///
 /// # Errors
 /// When the figure is larger than a picture can be.
 pub(in crate::cli) fn encode(svg: String, format: Format, scale: f32) -> anyhow::Result<Vec<u8>> {
-    if format == Format::Svg {
+    if format != Format::Png {
         return Ok(svg.into_bytes());
     }
     let options = usvg::Options {
