@@ -196,7 +196,7 @@ pub(crate) fn query(index: u32) -> OfferedQuery {
         asks_same_stage: index.is_multiple_of(4),
         disagreement: Some(0.25),
         stage_gap: Some(1.5),
-        typical_reward: None,
+        typical_reward: Some(TaskReward(3.0)),
     }
 }
 

@@ -63,6 +63,7 @@ fn task_rewards_are_for_programs_of_the_run_alone() {
     let program = app.program();
     let truth = program.send("GET", &path, None).expect(200).json();
     assert_eq!(truth["same_stage"], true);
+    assert_eq!(truth["typical_reward"], 3.0);
     let sums = [&truth["left"], &truth["right"]].map(|side| {
         side.as_array()
             .expect("rewards")

@@ -50,6 +50,8 @@ pub struct TaskRewards {
     pub second: Vec<f64>,
     /// Whether all four ends are in one true stage, where the task knows.
     pub same_stage: Option<bool>,
+    /// Mean task reward a step of the run's newest episodes when it was asked.
+    pub typical_reward: Option<f64>,
 }
 
 /// A query that cannot be shown.
@@ -220,7 +222,7 @@ impl Store {
     /// [`StoreError::Missing`].
     pub async fn task_rewards(&self, query: QueryId) -> Result<TaskRewards, StoreError> {
         let rows = sqlx::query(
-            "select run_id, session, position, task_rewards, stages from query
+            "select run_id, session, position, task_rewards, stages, typical_reward from query
              join query_segment on query_segment.query_id = query.id where query.id = ? order by which",
         )
         .bind(query.0)
@@ -251,6 +253,7 @@ impl Store {
             first: rewards(first)?,
             second: rewards(second)?,
             same_stage,
+            typical_reward: first.try_get(5)?,
         })
     }
 }
@@ -262,8 +265,9 @@ async fn add(
     clip_state: &str,
 ) -> Result<(), StoreError> {
     let row = sqlx::query(
-        "insert into query (run_id, session, position, asks_same_stage, disagreement, stage_gap, clip_state, created_at_ms)
-         values (?, ?, ?, ?, ?, ?, ?, ?) on conflict (run_id, session, position) do nothing returning id",
+        "insert into query (run_id, session, position, asks_same_stage, disagreement, stage_gap, typical_reward,
+                            clip_state, created_at_ms)
+         values (?, ?, ?, ?, ?, ?, ?, ?, ?) on conflict (run_id, session, position) do nothing returning id",
     )
     .bind(run.0)
     .bind(query.key.session)
@@ -271,6 +275,7 @@ async fn add(
     .bind(query.asks_same_stage)
     .bind(query.disagreement)
     .bind(query.stage_gap)
+    .bind(query.typical_reward.map(|reward| reward.0))
     .bind(clip_state)
     .bind(now_ms())
     .fetch_optional(&mut *t.connection)

@@ -27,6 +27,8 @@ pub struct TaskRewardsView {
     left_is: Which,
     /// Whether all four ends are in one true stage, where the task knows.
     same_stage: Option<bool>,
+    /// Mean task reward a step of the agent's newest episodes when the query was asked.
+    typical_reward: Option<f64>,
 }
 
 /// Task rewards of a query. Only for a program with a teacher token of the query's run.
@@ -64,5 +66,6 @@ pub async fn task_rewards(
         right,
         left_is,
         same_stage: truth.same_stage,
+        typical_reward: truth.typical_reward,
     }))
 }

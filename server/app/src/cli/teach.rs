@@ -133,6 +133,7 @@ struct TaskRewards {
     session: u32,
     index: u32,
     same_stage: Option<bool>,
+    typical_reward: Option<f64>,
 }
 
 impl Remote {
@@ -228,7 +229,7 @@ fn preference(judge: &dyn Judge, truth: TaskRewards) -> Value {
         asks_same_stage: false,
         disagreement: None,
         stage_gap: None,
-        typical_reward: None,
+        typical_reward: truth.typical_reward.map(TaskReward),
     };
     match judge.judge(&query) {
         Some(Preference::Prefer(which)) => {
@@ -275,6 +276,7 @@ mod tests {
             session: 0,
             index: 0,
             same_stage: None,
+            typical_reward: None,
         }
     }
 
@@ -291,5 +293,20 @@ mod tests {
         );
         assert_eq!(pressed(truth(&[1.0], &[1.0], Which::First)), "left");
         assert_eq!(pressed(truth(&[1.0], &[1.0], Which::Second)), "right");
+    }
+
+    #[test]
+    fn what_is_close_or_poor_is_measured_by_how_the_agent_does() {
+        let settings = domain::teacher::TeacherSettings::default();
+        let judge = |name: &str| domain::teacher::judge(name, 1, &settings).expect("a teacher");
+        let pressed = |name: &str, left: f64, right: f64| {
+            let mut truth = truth(&[left], &[right], Which::First);
+            truth.typical_reward = Some(8.0);
+            preference(judge(name).as_ref(), truth)["answer"].clone()
+        };
+        assert_eq!(pressed("equal", 5.0, 5.01), "equal");
+        assert_eq!(pressed("equal", 5.0, 7.0), "right");
+        assert_eq!(pressed("skip", 0.001, 0.002), "skip");
+        assert_eq!(pressed("skip", 5.0, 7.0), "right");
     }
 }
