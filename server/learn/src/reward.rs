@@ -48,6 +48,13 @@ pub struct RewardConfig {
     /// of 1. Without it, few answers that are passed over often saturate the tanh, and later
     /// answers can no longer move the reward there. B-Pref's `label_margin`.
     pub label_margin: f64,
+    /// Standard deviation that learned rewards have over the whole replay, their mean being 0;
+    /// relabelling sees to it. 0 leaves them as the members say, as the released code does.
+    ///
+    /// Preferences say nothing about how high all rewards lie and little about how far apart:
+    /// each fit moves both, and with them every value that the critics know.
+    /// Source: Christiano et al. (2017), 2.2.3, who normalise the rewards of their ensemble.
+    pub normalized_std: f64,
     /// `f32`, or `bf16` for faster and coarser fitting and relabelling.
     pub precision: Precision,
 }
@@ -62,6 +69,7 @@ impl Default for RewardConfig {
             max_epochs: 10,
             stop_accuracy: 0.97,
             label_margin: 0.0,
+            normalized_std: 0.0,
             precision: Precision::F32,
         }
     }
@@ -109,7 +117,7 @@ pub struct RewardFit {
 /// What the members say about steps.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Estimate {
-    /// Mean over members, in (−1, 1), `[n]`.
+    /// Mean over members, in (−1, 1) unless it is normalised, `[n]`.
     pub rewards: Vec<f32>,
     /// std over members (their number in the denominator), `[n]`.
     pub disagreements: Vec<f32>,
@@ -130,6 +138,9 @@ const SLOPE: f64 = 0.01;
 /// Rows that are computed at once, per member: their hidden layers stay in the cache.
 const CHUNK_ROWS: usize = 2_048;
 
+/// Rewards that vary less are not normalised: there is nothing to be told apart.
+const LEAST_VARIANCE: f64 = 1e-8;
+
 /// Several reward models of one form, trained side by side on the same preferences.
 pub struct RewardEnsemble {
     config: RewardConfig,
@@ -139,7 +150,30 @@ pub struct RewardEnsemble {
     parameters: Parameters,
     net: Net,
     gradient: Net,
+    scale: Scale,
     n_epochs: u64,
+}
+
+/// From what the members say to the reward that is learned from: `factor · (r − offset)`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Scale {
+    offset: f64,
+    factor: f64,
+}
+
+impl Scale {
+    const NONE: Self = Self {
+        offset: 0.0,
+        factor: 1.0,
+    };
+
+    fn apply(self, rewards: &mut [f32]) {
+        if self != Self::NONE {
+            for reward in rewards {
+                *reward = (self.factor * (f64::from(*reward) - self.offset)) as f32;
+            }
+        }
+    }
 }
 
 /// One member's order of the preferences in an epoch, and how it did.
@@ -227,6 +261,7 @@ impl RewardEnsemble {
             gradient: Net::over(&shape, &parameters.gradient, 0),
             parameters,
             net,
+            scale: Scale::NONE,
             n_epochs: 0,
         }
     }
@@ -377,7 +412,8 @@ impl RewardEnsemble {
         all_logits
     }
 
-    /// Mean over members of each step's reward, in (−1, 1), `[n]`, for rows `[n × S]`, `[n × A]`.
+    /// Each step's reward, `[n]`, for rows `[n × S]`, `[n × A]`: the mean over members, in
+    /// (−1, 1) unless it is normalised.
     pub fn predict(&self, observations: &[f32], actions: &[f32]) -> Vec<f32> {
         self.estimate(observations, actions).rewards
     }
@@ -392,7 +428,8 @@ impl RewardEnsemble {
         let n_rows = (n_numbers as i64 / self.columns) as usize;
         let rows = joined(observations, actions, n_rows);
         for rows in rows.chunks(CHUNK_ROWS * self.columns as usize) {
-            let own = self.moments(rows);
+            let mut own = self.moments(rows);
+            self.scale.apply(&mut own.rewards);
             estimate.rewards.extend(own.rewards);
             estimate.disagreements.extend(own.disagreements);
         }
@@ -400,9 +437,11 @@ impl RewardEnsemble {
     }
 
     /// Rewrites the learned reward of every transition, and the members' disagreement about it
-    /// where the replay keeps it.
-    pub fn relabel(&self, replay: &mut Replay) {
+    /// where the replay keeps it; brings the rewards to [`RewardConfig::normalized_std`], here
+    /// and in what is predicted until the next relabelling.
+    pub fn relabel(&mut self, replay: &mut Replay) {
         let mut rows = Vec::new();
+        let (mut n, mut sum, mut squares) = (0.0, 0.0, 0.0);
         for lane in 0..replay.n_lanes() {
             let n_steps = replay.lane_len(lane);
             for start in (0..n_steps).step_by(CHUNK_ROWS) {
@@ -410,10 +449,25 @@ impl RewardEnsemble {
                 rows.clear();
                 replay.append_lane_rows(lane, start..end, &mut rows);
                 let own = self.moments(&rows);
+                for reward in own.rewards.iter().copied().map(f64::from) {
+                    n += 1.0;
+                    sum += reward;
+                    squares += reward * reward;
+                }
                 replay.learned_rewards_mut(lane)[start..end].copy_from_slice(&own.rewards);
                 if replay.keeps_disagreement() {
                     replay.disagreements_mut(lane)[start..end].copy_from_slice(&own.disagreements);
                 }
+            }
+        }
+        let variance: f64 = squares / n - (sum / n) * (sum / n);
+        if self.config.normalized_std > 0.0 && variance > LEAST_VARIANCE {
+            self.scale = Scale {
+                offset: sum / n,
+                factor: self.config.normalized_std / variance.sqrt(),
+            };
+            for lane in 0..replay.n_lanes() {
+                self.scale.apply(replay.learned_rewards_mut(lane));
             }
         }
     }
@@ -442,6 +496,7 @@ impl RewardEnsemble {
     pub fn save(&self, archive: &mut Archive) {
         self.parameters.save("reward", archive);
         archive.put_json("reward.epochs", &self.n_epochs);
+        archive.put_f64("reward.scale", &[self.scale.offset, self.scale.factor]);
     }
 
     /// What [`RewardEnsemble::save`] wrote, from any device.
@@ -451,6 +506,8 @@ impl RewardEnsemble {
     pub fn load(&mut self, archive: &Archive) -> Result<(), LearnError> {
         self.parameters.load("reward", archive)?;
         self.n_epochs = archive.json("reward.epochs")?;
+        let [offset, factor] = archive.f64("reward.scale")?;
+        self.scale = Scale { offset, factor };
         Ok(())
     }
 

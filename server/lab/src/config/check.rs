@@ -151,6 +151,14 @@ impl RunConfig {
                 return out(key, batch.to_string(), "from 1 to 1000000");
             }
         }
+        let std = self.reward.normalized_std;
+        if !(std >= 0.0 && std.is_finite()) {
+            return out(
+                "reward.normalized_std",
+                std.to_string(),
+                "a number from 0 on",
+            );
+        }
         if !(1..=64).contains(&self.reward.members) {
             return out(
                 "reward.members",

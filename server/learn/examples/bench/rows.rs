@@ -216,7 +216,7 @@ fn reward(precision: Precision) -> Work {
 
 fn relabel(precision: Precision) -> Work {
     let mut replay = random_replay(2_000, 500, 1);
-    let ensemble = ensemble(&RewardConfig {
+    let mut ensemble = ensemble(&RewardConfig {
         precision,
         ..RewardConfig::default()
     });

@@ -250,7 +250,7 @@ fn the_disagreement_about_a_reward_is_the_members_std_and_goes_to_the_replay() {
         ..small()
     };
     let alone = RewardEnsemble::new(&twice, 3, 2, 1, Device::CPU);
-    let ensemble = RewardEnsemble::new(&small(), 3, 2, 1, Device::CPU);
+    let mut ensemble = RewardEnsemble::new(&small(), 3, 2, 1, Device::CPU);
     let (id, t) = (EpisodeId(1), 7);
     let (state, action) = (
         replay.observation(id, t).to_vec(),
@@ -265,4 +265,50 @@ fn the_disagreement_about_a_reward_is_the_members_std_and_goes_to_the_replay() {
     ensemble.relabel(&mut replay);
     let kept = replay.disagreements_mut(0)[EPISODE_LEN as usize + t];
     assert!((kept - std).abs() < 1e-6, "{kept} {std}");
+}
+
+#[test]
+fn normalised_rewards_keep_their_order_and_their_spread() {
+    let mut replay = replay(40);
+    let labeled = labeled(&replay, 100, |_| 5);
+    let relabeled = |normalized_std: f64, replay: &mut Replay| {
+        let config = RewardConfig {
+            normalized_std,
+            ..small()
+        };
+        let mut ensemble = RewardEnsemble::new(&config, 3, 2, 1, Device::CPU);
+        ensemble.fit(replay, &labeled);
+        ensemble.relabel(replay);
+        (ensemble, replay.learned_rewards_mut(0).to_vec())
+    };
+    let (_, plain) = relabeled(0.0, &mut replay);
+    let (ensemble, normal) = relabeled(0.5, &mut replay);
+    let moments = |values: &[f32]| {
+        let n = values.len() as f64;
+        let mean = values.iter().copied().map(f64::from).sum::<f64>() / n;
+        let square = values
+            .iter()
+            .map(|v| (f64::from(*v) - mean).powi(2))
+            .sum::<f64>();
+        (mean, (square / n).sqrt())
+    };
+    let (mean, std) = moments(&normal);
+    assert!(
+        mean.abs() < 1e-6 && (std - 0.5).abs() < 1e-5,
+        "{mean} {std}"
+    );
+    let (plain_mean, plain_std) = moments(&plain);
+    for (own, raw) in normal.iter().zip(&plain) {
+        let expected = 0.5 * (f64::from(*raw) - plain_mean) / plain_std;
+        assert!((f64::from(*own) - expected).abs() < 1e-5);
+    }
+    // what is predicted afterwards is on the same scale, also after a restart
+    let mut archive = Archive::new();
+    ensemble.save(&mut archive);
+    let mut restored = RewardEnsemble::new(&ensemble.config, 3, 2, 9, Device::CPU);
+    restored.load(&archive).unwrap();
+    let mut rows = Vec::new();
+    replay.append_lane_rows(0, 0..1, &mut rows);
+    let predicted = restored.predict(&rows[..3], &rows[3..]);
+    assert!((predicted[0] - normal[0]).abs() < 1e-6);
 }
