@@ -40,8 +40,6 @@ impl Layer {
 /// Seconds of a [`world`]'s step: one control step.
 const STEP_S: f32 = 0.0125;
 const N_SUBSTEPS: usize = 4;
-/// Seconds in which a [`world`]'s dynamics advance at once.
-pub const SUBSTEP_S: f32 = STEP_S / N_SUBSTEPS as f32;
 
 /// An empty world that is stepped once per control step (12.5 ms in four substeps). Without
 /// gravity: the arm carries the hand, assemblies slide level.

@@ -157,6 +157,10 @@ impl Setup for DoorUnlock {
         Self { root, lever }
     }
 
+    fn meet_stops(&self, world: &mut PhysicsWorld) {
+        self.lever.meet_stops(world);
+    }
+
     fn object(&self, world: &PhysicsWorld) -> Lock {
         Lock {
             root: self.root,

@@ -148,6 +148,10 @@ impl Setup for DrawerOpen {
         Self { root, drawer }
     }
 
+    fn meet_stops(&self, world: &mut PhysicsWorld) {
+        self.drawer.meet_stops(world);
+    }
+
     fn object(&self, world: &PhysicsWorld) -> Drawer {
         Drawer {
             root: self.root,

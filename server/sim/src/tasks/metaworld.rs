@@ -136,6 +136,9 @@ pub trait Setup: Sized + Serialize + DeserializeOwned {
     /// Adds the object, its root at `root`.
     fn add_object(world: &mut PhysicsWorld, root: Point) -> Self;
 
+    /// Lets the object's stops take hold or let go; called before each step.
+    fn meet_stops(&self, _world: &mut PhysicsWorld) {}
+
     /// Reads where the object is.
     fn object(&self, world: &PhysicsWorld) -> Self::Object;
 

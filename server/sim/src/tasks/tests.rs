@@ -251,10 +251,15 @@ fn every_pose_puts_every_body_of_the_scene_in_its_place() {
     }
 }
 
-/// A quarter more: RoboDesk's reward pays about half of its best for doing nothing, and more
-/// where an episode begins near the button.
+/// How many times a random policy's return an expert's has to be: twice, but for RoboDesk,
+/// whose reward pays about half of its best for doing nothing and more where an episode begins
+/// near the button.
+fn advantage(task: &Task) -> f64 {
+    if task.name == "push-green" { 1.25 } else { 2.0 }
+}
+
 #[test]
-fn every_expert_earns_more_than_a_random_policy() {
+fn every_expert_earns_twice_what_a_random_policy_earns() {
     for task in tasks() {
         let Some(mut expert) = task.expert else {
             continue;
@@ -272,7 +277,7 @@ fn every_expert_earns_more_than_a_random_policy() {
         let expert = mean_return(&mut expert);
         let random = mean_return(&mut random_policy(task, 1));
         assert!(
-            expert > 1.25 * random,
+            expert > advantage(task) * random,
             "{}: {expert} against {random}",
             task.name
         );

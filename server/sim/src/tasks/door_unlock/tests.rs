@@ -52,3 +52,19 @@ fn a_tip_tells_its_angle() {
         assert!((angle_of(root, tip(root, angle)) - angle).abs() < 1e-12);
     }
 }
+
+/// METAWORLD.md 1.9: recordings reach −0.74, where a rigid stop would hold.
+#[test]
+fn the_expert_overturns_the_lever_into_its_soft_stop() {
+    let mut environment = Simulation::<DoorUnlock>::new();
+    for seed in 0..5 {
+        let mut observation = environment.reset(seed);
+        let mut least: f64 = 0.0;
+        for _ in 0..300 {
+            let step = environment.step(&expert(&observation));
+            observation = step.expect("the expert's actions fit").observation;
+            least = least.min(environment.readings().object.angle);
+        }
+        assert!((-0.9..-0.2).contains(&least), "seed {seed}: {least}");
+    }
+}
