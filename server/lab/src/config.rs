@@ -822,18 +822,21 @@ pub(crate) fn unknown<'a>(
     }
 }
 
+/// Names of presets, each once; tasks bring their own without being asked.
+pub(crate) fn preset_names() -> Vec<&'static str> {
+    let names = PRESETS.iter().map(|(name, _, _)| *name);
+    let mut known: Vec<&str> = names.filter(|name| *name != "task").collect();
+    known.sort_unstable();
+    known.dedup();
+    known
+}
+
 fn preset(name: &str, task: &str) -> Result<Table, ConfigError> {
     let found = PRESETS
         .iter()
         .find(|(n, t, _)| *n == name && (t.is_empty() || *t == task));
     let Some((_, _, text)) = found else {
-        let mut known: Vec<&str> = PRESETS
-            .iter()
-            .map(|(n, _, _)| *n)
-            .filter(|n| *n != "task")
-            .collect();
-        known.dedup();
-        return Err(unknown("preset", name, known.into_iter()));
+        return Err(unknown("preset", name, preset_names().into_iter()));
     };
     parse_layer(&format!("preset {name}"), text)
 }
@@ -861,7 +864,8 @@ fn parse_override(text: &str) -> Result<Table, ConfigError> {
     parse_layer(&origin, &format!("{key} = {value}"))
 }
 
-fn invalid(origin: &str, text: &str, error: &toml::de::Error) -> ConfigError {
+/// An error of TOML with its line, and the nearest right key where one is unknown.
+pub(crate) fn invalid(origin: &str, text: &str, error: &toml::de::Error) -> ConfigError {
     let line = error
         .span()
         .map(|span| 1 + text[..span.start.min(text.len())].matches('\n').count());
