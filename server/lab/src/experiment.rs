@@ -11,6 +11,7 @@ use crate::figure::FigureError;
 pub mod abstract_mdp;
 pub mod grid;
 pub mod query_counts;
+pub mod report;
 pub mod results;
 
 /// How an experiment is run.

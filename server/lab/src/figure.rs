@@ -17,10 +17,13 @@ mod query_counts;
 mod rows;
 mod same_stage_bars;
 mod seeds;
+mod stage_gaps;
 mod stage_map;
 
+pub use curves::points as curve_points;
 pub use preferences::{PreferenceRow, Preferred};
 pub use rows::{CurveRow, rows_of_run};
+pub use stage_gaps::points as stage_gap_points;
 
 /// A file of results, read: JSON Lines.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -67,6 +70,7 @@ pub const FIGURES: &[FigureEntry] = &[
     preference_fit::ENTRY,
     same_stage_bars::ENTRY,
     stage_map::ENTRY,
+    stage_gaps::ENTRY,
 ];
 
 /// Why a figure cannot be drawn.
@@ -155,7 +159,7 @@ fn read_rows<T: DeserializeOwned>(
     let mut rows = Vec::new();
     for source in sources {
         for (i, line) in source.text.lines().enumerate() {
-            if line.trim().is_empty() {
+            if line.trim().is_empty() || is_of_another_kind(figure, line) {
                 continue;
             }
             rows.push(
@@ -174,6 +178,20 @@ fn read_rows<T: DeserializeOwned>(
         });
     }
     Ok(rows)
+}
+
+/// Rows of an experiment's results say what they are; a figure passes over those of other kinds.
+fn is_of_another_kind(figure: &FigureEntry, line: &str) -> bool {
+    #[derive(serde::Deserialize)]
+    struct Kind {
+        kind: String,
+    }
+    let wanted = match figure.name {
+        "curves" => "evaluation",
+        "stage-gaps" => "session",
+        _ => return false,
+    };
+    serde_json::from_str::<Kind>(line).is_ok_and(|row| row.kind != wanted)
 }
 
 /// The value of a choice: the first one where nothing was asked for.

@@ -3,9 +3,12 @@
 use std::collections::BTreeMap;
 
 use super::plot::{Entry, Labels, Panel, Scale, Sheet, series};
-use super::seeds::{BAND, Curve, draw_seeds, in_order_of_appearance};
+use super::seeds::{
+    BAND, Curve, add_line, draw_seeds, drawn_lines, in_order_of_appearance, quoted,
+};
 use super::{
-    CurveRow, FigureEntry, FigureError, Request, choose, make_center, read_rows, shown_method,
+    Center, CurveRow, FigureEntry, FigureError, Request, choose, make_center, read_rows,
+    shown_method,
 };
 use crate::method::METHODS;
 
@@ -30,30 +33,59 @@ struct Axes {
     is_rate: bool,
 }
 
+/// What is drawn, before it is.
+struct Plan {
+    axes: Axes,
+    center: Center,
+    rows: Vec<CurveRow>,
+    tasks: Vec<String>,
+    groups: Vec<Group>,
+}
+
+impl Plan {
+    fn of(request: &Request) -> Result<Self, FigureError> {
+        let steps: (&str, Column) = ("Environment steps", |row| row.step as f64);
+        let labels: (&str, Column) = ("Labels", |row| f64::from(row.labels));
+        let success: (&str, Column) = ("Success (%)", |row| 100.0 * row.success_rate);
+        let returns: (&str, Column) = ("Return", |row| row.return_mean);
+        let axes = Axes {
+            x: choose("x", request.x, &[("step", steps), ("labels", labels)])?,
+            y: choose(
+                "y",
+                request.y,
+                &[("success_rate", success), ("return_mean", returns)],
+            )?,
+            is_rate: request.y != Some("return_mean"),
+        };
+        let center = make_center(request.center)?;
+        let rows: Vec<CurveRow> = read_rows(&ENTRY, request.sources)?;
+        Ok(Self {
+            axes,
+            center,
+            tasks: in_order_of_appearance(rows.iter().map(|row| row.task.clone())),
+            groups: groups(&rows),
+            rows,
+        })
+    }
+
+    /// The curves of each group on a task, each with its seed.
+    fn curves(&self, task: &str) -> Result<Vec<Vec<(u64, Curve)>>, FigureError> {
+        let rows: Vec<&CurveRow> = self.rows.iter().filter(|row| row.task == task).collect();
+        let of_group = |group| curves(&rows, group, self.axes);
+        self.groups.iter().map(of_group).collect()
+    }
+}
+
 fn make(request: &Request) -> Result<String, FigureError> {
-    let steps: (&str, Column) = ("Environment steps", |row| row.step as f64);
-    let labels: (&str, Column) = ("Labels", |row| f64::from(row.labels));
-    let success: (&str, Column) = ("Success (%)", |row| 100.0 * row.success_rate);
-    let returns: (&str, Column) = ("Return", |row| row.return_mean);
-    let axes = Axes {
-        x: choose("x", request.x, &[("step", steps), ("labels", labels)])?,
-        y: choose(
-            "y",
-            request.y,
-            &[("success_rate", success), ("return_mean", returns)],
-        )?,
-        is_rate: request.y != Some("return_mean"),
-    };
-    let center = make_center(request.center)?;
-    let rows: Vec<CurveRow> = read_rows(&ENTRY, request.sources)?;
-    let tasks = in_order_of_appearance(rows.iter().map(|row| row.task.clone()));
-    let groups = groups(&rows);
-    let key: Vec<Entry> = groups
+    let plan = Plan::of(request)?;
+    let (axes, tasks) = (plan.axes, &plan.tasks);
+    let key: Vec<Entry> = plan
+        .groups
         .iter()
         .enumerate()
         .map(|(n, group)| Entry {
             look: series(n),
-            name: key_name(group, &rows),
+            name: key_name(group, &plan.rows),
             has_line: true,
         })
         .collect();
@@ -65,11 +97,11 @@ fn make(request: &Request) -> Result<String, FigureError> {
     let sheet = Sheet::new(tasks.len(), 3, size, key).noted(BAND);
     let mut svg = sheet.start();
     for (n, task) in tasks.iter().enumerate() {
-        let rows: Vec<&CurveRow> = rows.iter().filter(|row| row.task == *task).collect();
-        let curves = groups
-            .iter()
-            .map(|group| curves(&rows, group, axes))
-            .collect::<Result<Vec<_>, _>>()?;
+        let curves = plan.curves(task)?;
+        let curves: Vec<Vec<Curve>> = curves
+            .into_iter()
+            .map(|seeds| seeds.into_iter().map(|(_, curve)| curve).collect())
+            .collect();
         let points = || curves.iter().flatten().flatten();
         let panel = Panel {
             frame: sheet.frame(n),
@@ -89,14 +121,37 @@ fn make(request: &Request) -> Result<String, FigureError> {
             y: axes.y.0,
         };
         panel.draw_axes(&mut svg, labels);
-        draw_seeds(&mut svg, &panel, &curves, center);
+        draw_seeds(&mut svg, &panel, &curves, plan.center);
     }
     let title = format!("{} over {}, by method", axes.y.0, axes.x.0.to_lowercase());
     Ok(svg.finish(&title))
 }
 
+/// Every point of the figure as CSV: those of each seed, of the centres, and of both ends of the
+/// bands.
+///
+/// # Errors
+/// As for drawing it.
+pub fn points(request: &Request) -> Result<String, FigureError> {
+    let plan = Plan::of(request)?;
+    let mut csv = String::from("task,method,setting,line,x,y\n");
+    for task in &plan.tasks {
+        for ((method, setting), seeds) in plan.groups.iter().zip(plan.curves(task)?) {
+            let named = |line: String| format!("{task},{method},{},{line}", quoted(setting));
+            for (seed, curve) in &seeds {
+                add_line(&mut csv, &named(format!("seed {seed}")), curve);
+            }
+            let curves: Vec<Curve> = seeds.into_iter().map(|(_, curve)| curve).collect();
+            for (line, curve) in drawn_lines(&curves, plan.center) {
+                add_line(&mut csv, &named(line.to_owned()), &curve);
+            }
+        }
+    }
+    Ok(csv)
+}
+
 /// The curve of each seed of a group, in order of seed.
-fn curves(rows: &[&CurveRow], group: &Group, axes: Axes) -> Result<Vec<Curve>, FigureError> {
+fn curves(rows: &[&CurveRow], group: &Group, axes: Axes) -> Result<Vec<(u64, Curve)>, FigureError> {
     let mut seeds: BTreeMap<u64, BTreeMap<u64, &CurveRow>> = BTreeMap::new();
     for row in rows.iter().filter(|row| is_in(row, group)) {
         if seeds
@@ -127,7 +182,8 @@ fn curves(rows: &[&CurveRow], group: &Group, axes: Axes) -> Result<Vec<Curve>, F
         }
         curve
     };
-    Ok(seeds.into_values().map(curve).collect())
+    let curves = seeds.into_iter().map(|(seed, steps)| (seed, curve(steps)));
+    Ok(curves.collect())
 }
 
 /// Methods in the registry's order, others after them; settings in order of appearance.
@@ -208,6 +264,28 @@ mod tests {
             "the registry's order"
         );
         assert_eq!(draw(text).unwrap(), svg, "the same bytes");
+    }
+
+    #[test]
+    fn every_plotted_point_can_be_had_as_a_number() {
+        let text = row("stair", 1, 0, 0.0) + &row("stair", 2, 0, 0.5) + &row("stair", 3, 0, 1.0);
+        let sources = [Source {
+            name: "rows.jsonl".into(),
+            text,
+        }];
+        let request = Request {
+            sources: &sources,
+            ..Request::default()
+        };
+        let csv = points(&request).unwrap();
+        let lines: Vec<&str> = csv.lines().collect();
+        assert_eq!(lines[1], "window-open,stair,,seed 1,0,0");
+        assert_eq!(lines[3], "window-open,stair,,seed 3,0,100");
+        assert_eq!(lines[4], "window-open,stair,,centre,0,50");
+        assert!(
+            lines[5].starts_with("window-open,stair,,lo,0,") && lines.len() == 7,
+            "{csv}"
+        );
     }
 
     #[test]

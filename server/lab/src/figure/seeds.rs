@@ -90,6 +90,34 @@ fn interpolate(curve: &[(f64, f64)], x: f64) -> f64 {
     }
 }
 
+/// What is drawn of a group beside its seeds: the centre, and both ends of the band.
+pub(super) fn drawn_lines(
+    seeds: &[Curve],
+    center: fn(&[f64]) -> f64,
+) -> [(&'static str, Curve); 3] {
+    let line = Line::of(seeds, center);
+    let lo = line.band.iter().map(|&(x, lo, _)| (x, lo)).collect();
+    let hi = line.band.iter().map(|&(x, _, hi)| (x, hi)).collect();
+    [("centre", line.center), ("lo", lo), ("hi", hi)]
+}
+
+/// The points of a line as rows of CSV behind what the line is.
+pub(super) fn add_line(csv: &mut String, line: &str, points: &[(f64, f64)]) {
+    for (x, y) in points {
+        let row = format!("{line},{x},{y}\n");
+        csv.push_str(&row);
+    }
+}
+
+/// A text as a field of CSV (RFC 4180).
+pub(super) fn quoted(text: &str) -> String {
+    if text.contains([',', '"', '\n']) {
+        format!("\"{}\"", text.replace('"', "\"\""))
+    } else {
+        text.to_owned()
+    }
+}
+
 /// Each value once.
 pub(super) fn in_order_of_appearance<T: PartialEq>(values: impl IntoIterator<Item = T>) -> Vec<T> {
     let mut seen = Vec::new();

@@ -6,6 +6,7 @@
 //! settings/HASH.toml    resolved settings by fingerprint, seeds left out
 //! runs/NAME/            a run: its folder, history.json, log.txt
 //! progress.json         where the grid is, while it runs
+//! log.jsonl             what runs said at their end; locked while any of them is up
 //! ```
 
 use std::fs::{self, File, OpenOptions};
@@ -122,14 +123,15 @@ impl GridFolder {
         self.replace("experiment.toml", text)
     }
 
-    /// A file that whoever works on the grid holds locked.
+    /// The log, which whoever works on the grid holds locked: a run that was started from here
+    /// writes to the same open file, so that the lock lasts until the last of them has ended.
     ///
     /// # Errors
     /// When the disk refuses.
-    pub fn lock_file(&self) -> Result<File, StoreError> {
-        let path = self.root.join("lock");
+    pub fn log_file(&self) -> Result<File, StoreError> {
+        let path = self.root.join("log.jsonl");
         let file = OpenOptions::new().create(true).append(true).open(&path);
-        file.map_err(refused("open the experiment's lock", &path))
+        file.map_err(refused("open the experiment's log", &path))
     }
 
     /// Where the rows are.

@@ -1,0 +1,74 @@
+//! `stair experiment check` and `list`: which runs a file stands for, and what they cost.
+
+use std::process::ExitCode;
+use std::time::Duration;
+
+use lab::config::find_task;
+use lab::cost::{core_time_here, on_cores};
+use lab::experiment::grid::{self, Grid, GridRun, SHIPPED};
+
+use super::{Chosen, in_words};
+
+/// The machine for which costs are told.
+const CORES: usize = 2;
+
+/// List the runs of a grid with what they cost, and run none
+#[derive(Debug, clap::Args)]
+pub(super) struct Args {
+    /// A TOML file, or the name of one that comes with the program
+    file: String,
+    /// The small variant: the same figure from few runs
+    #[arg(long)]
+    small: bool,
+}
+
+/// List the grids that come with the program, with what each costs on two cores like these
+#[derive(Debug, clap::Args)]
+pub(super) struct ListArgs {}
+
+pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    let chosen = Chosen::open(&args.file, args.small)?;
+    println!("{}\n{}\n", chosen.grid.title, chosen.grid.about);
+    for run in &chosen.grid.runs {
+        println!(
+            "{:60} {:>9} steps  {:>6} answers  {:>9}",
+            run.key.name(),
+            run.config.training.total_steps,
+            run.config.feedback.budget,
+            in_words(time(run))
+        );
+    }
+    println!("\n{}", cost(&chosen.grid));
+    Ok(ExitCode::SUCCESS)
+}
+
+pub(super) fn list() -> ExitCode {
+    for shipped in SHIPPED {
+        let resolved = |is_small| grid::resolve(shipped.source(), is_small);
+        let (Ok(whole), Ok(small)) = (resolved(false), resolved(true)) else {
+            continue; // a test resolves them all
+        };
+        println!("{}: {}", shipped.name, whole.title);
+        println!("  {}", whole.about.replace('\n', "\n  "));
+        println!("  {}", cost(&whole));
+        println!("  --small: {}\n", cost(&small));
+    }
+    ExitCode::SUCCESS
+}
+
+/// `12 runs, about 3 h on 2 cores like this machine's`
+fn cost(grid: &Grid) -> String {
+    let whole = on_cores(grid.runs.iter().map(time), CORES);
+    format!(
+        "{} runs, about {} on {CORES} cores like this machine's",
+        grid.runs.len(),
+        in_words(whole)
+    )
+}
+
+/// About how long a run takes on a core of its own.
+pub(super) fn time(run: &GridRun) -> Duration {
+    find_task(&run.config.task).map_or(Duration::ZERO, |task| {
+        core_time_here(&run.config, &(task.spec)())
+    })
+}
