@@ -2,6 +2,7 @@
 
 mod bad_input;
 mod env_over_pipes;
+mod experiment;
 mod lost_replies;
 mod restart;
 mod resume;

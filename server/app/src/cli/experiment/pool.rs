@@ -354,3 +354,42 @@ fn left_s(folder: &GridFolder, run: &GridRun) -> f64 {
     let share = step(folder, run) as f64 / run.config.training.total_steps as f64;
     check::time(run).as_secs_f64() * (1.0 - share.min(1.0))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ended(status: i32, log: &str, metrics: &str) -> End {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("log.txt"), log).unwrap();
+        std::fs::write(folder.path().join("metrics.jsonl"), metrics).unwrap();
+        end(folder.path(), ExitStatus::from_raw(status))
+    }
+
+    #[test]
+    fn a_run_that_ends_well_is_finished_or_was_stopped() {
+        let evaluation = "{\"kind\":\"evaluation\",\"step\":5}\n";
+        let finished = "{\"kind\":\"finished\",\"step\":9}\n";
+        assert!(matches!(
+            ended(0, "", &format!("{evaluation}{finished}")),
+            End::Finished
+        ));
+        assert!(matches!(ended(0, "", evaluation), End::Stopped));
+        assert!(matches!(ended(0, "", ""), End::Stopped));
+    }
+
+    #[test]
+    fn a_run_that_fails_says_why() {
+        let End::Failed(reason) = ended(0x0100, "Passed over\nstair: no card\n\n", "") else {
+            panic!("code 1 is a failure")
+        };
+        assert_eq!(reason, "no card");
+        let End::Failed(reason) = ended(9, "", "") else {
+            panic!("a signal is a failure")
+        };
+        assert!(
+            reason.contains("signal 9") && reason.contains("memory"),
+            "{reason}"
+        );
+    }
+}
