@@ -172,7 +172,7 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    fn misfit(&self, at: usize, reason: impl ToString) -> GridError {
+    fn misfit(&self, at: usize, reason: &dyn ToString) -> GridError {
         GridError::Misfit {
             file: self.source.name.to_owned(),
             line: self.line(at),
@@ -258,13 +258,13 @@ impl Reader<'_> {
             axis: what,
         };
         let Some(names) = axis else {
-            return Err(self.misfit(0, format!("{what} are not named under [axes]")));
+            return Err(self.misfit(0, &format!("{what} are not named under [axes]")));
         };
         if names.get_ref().is_empty() {
             return Err(empty(names.span().start));
         }
         for name in names.get_ref() {
-            check(name.get_ref()).map_err(|error| self.misfit(name.span().start, error))?;
+            check(name.get_ref()).map_err(|error| self.misfit(name.span().start, &error))?;
         }
         Ok(names
             .get_ref()
@@ -288,7 +288,7 @@ impl Reader<'_> {
             } else {
                 continue;
             };
-            return Err(self.misfit(setting.name.span().start, reason));
+            return Err(self.misfit(setting.name.span().start, &reason));
         }
         let Some(named) = &axes.settings else {
             return Ok(if all.is_empty() {
@@ -374,7 +374,7 @@ impl Reader<'_> {
         for preset in written().flat_map(|(presets, _)| presets) {
             if !preset_names().contains(&preset.get_ref().as_str()) {
                 let error = unknown("preset", preset.get_ref(), preset_names().into_iter());
-                return Err(self.misfit(preset.span().start, error));
+                return Err(self.misfit(preset.span().start, &error));
             }
         }
         // One line alone is wrong, or a value that only the whole tree can judge.

@@ -24,10 +24,13 @@ pub(super) const ENTRY: FigureEntry = FigureEntry {
 /// Method and setting, and whether it is of the chosen pairs.
 type Group = (String, String, bool);
 
+/// The curve of each seed of a group.
+type Seeds = Vec<(u64, Curve)>;
+
 /// Curves of each group by task.
 struct Plan {
     groups: Vec<Group>,
-    tasks: Vec<(String, Vec<Vec<(u64, Curve)>>)>,
+    tasks: Vec<(String, Vec<Seeds>)>,
 }
 
 impl Plan {

@@ -162,6 +162,9 @@ impl GridFolder {
     ///
     /// # Errors
     /// When the disk refuses.
+    ///
+    /// # Panics
+    /// Never: rows are plain values.
     pub fn add(&self, rows: &[Row]) -> Result<(), StoreError> {
         let len = self.results()?.len;
         let path = self.results_path();
@@ -220,6 +223,9 @@ impl GridFolder {
     ///
     /// # Errors
     /// When the disk refuses.
+    ///
+    /// # Panics
+    /// Never: a history is plain values.
     pub fn keep_history(&self, key: &RunKey, history: &RunHistory) -> Result<(), StoreError> {
         let path = self.run_path(key);
         fs::create_dir_all(&path).map_err(refused("make the run's folder", &path))?;
