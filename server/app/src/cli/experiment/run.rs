@@ -16,7 +16,7 @@ use crate::cli::BadInput;
 use crate::cli::interrupt::on_interrupt;
 
 /// How long to wait for runs of an earlier start to leave their checkpoints.
-const PATIENCE: Duration = Duration::from_secs(60);
+const PATIENCE: Duration = Duration::from_mins(1);
 
 /// Run a grid: whatever is finished is kept, whatever was started goes on
 #[derive(Debug, clap::Args)]
