@@ -233,8 +233,8 @@ fn several_budgets_of_a_method_make_a_figure_of_their_own() {
         for seed in 1..=2 {
             text += &Told {
                 setting,
-                budget,
                 seed,
+                budget,
                 ..STAIR
             }
             .text();
