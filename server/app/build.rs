@@ -1,5 +1,5 @@
 //! Link arguments for libtorch, the revision for `stair --version`, and the files of `web/static`
-//! and `assets/guidance` inside the program.
+//! and `assets/guidance` and the results of experiments inside the program.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -14,6 +14,7 @@ fn main() {
     emit_revision();
     embed_static_files();
     embed_guidance();
+    embed_results();
 }
 
 /// `STAIR_REVISION`: the short commit, `+` where the tree differs from it, `unknown` outside git.
@@ -69,6 +70,33 @@ fn embed(folder: &str, table_name: &str, entry: impl Fn(&Path, &str) -> String) 
     }
     table.push_str("]\n");
     let out = PathBuf::from(variable("OUT_DIR")).join(table_name);
+    std::fs::write(&out, table).expect("cargo's output folder can be written");
+}
+
+/// Writes `results.rs`: `(name, experiment.toml, results.jsonl)` of every experiment below
+/// `assets/results`, sorted by name.
+fn embed_results() {
+    let root = PathBuf::from(variable("CARGO_MANIFEST_DIR")).join("../../assets/results");
+    println!("cargo:rerun-if-changed={}", root.display());
+    let mut files = Vec::new();
+    collect(&root, &mut files);
+    files.retain(|file| file.ends_with("results.jsonl"));
+    files.sort();
+    let mut table = String::from("&[\n");
+    for rows in &files {
+        let name = rows.parent().and_then(Path::file_name);
+        let name = name.expect("a file lies in a folder").to_string_lossy();
+        let grid = rows.with_file_name("experiment.toml");
+        writeln!(
+            table,
+            "    ({name:?}, include_str!({:?}), include_str!({:?})),",
+            grid.display().to_string(),
+            rows.display().to_string()
+        )
+        .expect("writing to a string cannot fail");
+    }
+    table.push_str("]\n");
+    let out = PathBuf::from(variable("OUT_DIR")).join("results.rs");
     std::fs::write(&out, table).expect("cargo's output folder can be written");
 }
 

@@ -1,4 +1,5 @@
-//! Link arguments for this crate's tests and examples, and the presets inside the program.
+//! Link arguments for this crate's tests and examples; presets and ready experiments inside the
+//! program.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -9,14 +10,13 @@ fn main() {
     println!("cargo:rerun-if-changed=../learn/rpath.rs");
     emit_link_arguments();
     embed_presets();
+    embed_experiments();
 }
 
 /// Writes `presets.rs`: `(name, task or "", text)` of every file below `assets/presets`. There
 /// `NAME.toml` and `method/NAME.toml` hold for any task, `NAME/TASK.toml` for one.
 fn embed_presets() {
-    let variable = |name: &str| PathBuf::from(std::env::var(name).expect("cargo sets it"));
-    let root = variable("CARGO_MANIFEST_DIR").join("../../assets/presets");
-    println!("cargo:rerun-if-changed={}", root.display());
+    let root = assets("presets");
     let mut presets = Vec::new();
     for path in entries(&root) {
         if !path.is_dir() {
@@ -32,16 +32,48 @@ fn embed_presets() {
         }
     }
     presets.sort();
+    let entry = |(name, task, path): (String, String, PathBuf)| {
+        format!("({name:?}, {task:?}, {})", included(&path))
+    };
+    write_table("presets.rs", presets.into_iter().map(entry));
+}
+
+/// Writes `experiments.rs`: a `ShippedGrid` of every file in `assets/experiments`.
+fn embed_experiments() {
+    let mut paths = entries(&assets("experiments"));
+    paths.sort();
+    let entry = |path: PathBuf| {
+        let (name, text) = (stem(&path), included(&path));
+        format!("ShippedGrid {{ name: {name:?}, text: {text} }}")
+    };
+    write_table("experiments.rs", paths.into_iter().map(entry));
+}
+
+fn assets(folder: &str) -> PathBuf {
+    let root = variable("CARGO_MANIFEST_DIR")
+        .join("../../assets")
+        .join(folder);
+    println!("cargo:rerun-if-changed={}", root.display());
+    root
+}
+
+fn included(path: &Path) -> String {
+    println!("cargo:rerun-if-changed={}", path.display());
+    format!("include_str!({:?})", path.display().to_string())
+}
+
+fn write_table(name: &str, entries: impl Iterator<Item = String>) {
     let mut table = String::from("&[\n");
-    for (name, task, path) in presets {
-        println!("cargo:rerun-if-changed={}", path.display());
-        let path = path.display().to_string();
-        writeln!(table, "    ({name:?}, {task:?}, include_str!({path:?})),")
-            .expect("writing to a string cannot fail");
+    for entry in entries {
+        writeln!(table, "    {entry},").expect("writing to a string cannot fail");
     }
     table.push_str("]\n");
-    std::fs::write(variable("OUT_DIR").join("presets.rs"), table)
+    std::fs::write(variable("OUT_DIR").join(name), table)
         .expect("cargo's output folder can be written");
+}
+
+fn variable(name: &str) -> PathBuf {
+    PathBuf::from(std::env::var(name).expect("cargo sets it"))
 }
 
 fn entries(folder: &Path) -> Vec<PathBuf> {

@@ -33,6 +33,8 @@ async fn look_at_every_page(scheme: Scheme, size: (u32, u32)) {
         )
         .await;
     look("home", &browser).await;
+    browser.goto(&desk.page("/experiments")).await;
+    look("experiments", &browser).await;
     browser.goto(&desk.page("/runs/no-such-run")).await;
     look("problem", &browser).await;
     browser.goto(&desk.label_page()).await;

@@ -230,3 +230,41 @@ fn a_teacher_without_server_run_or_right_token_is_told_which() {
         &["token"],
     );
 }
+
+#[test]
+fn an_experiment_that_does_not_fit_is_named_with_its_line() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let here = folder.path();
+    let grid = |name: &str, methods: &str| {
+        let text =
+            format!("title = \"x\"\n\n[axes]\ntasks = [\"window-open\"]\nmethods = {methods}\n");
+        std::fs::write(here.join(name), text).expect("a file");
+    };
+    grid("name.toml", "[\"stiar\"]");
+    grid("empty.toml", "[]");
+    let run = |file| ["experiment", "run", file];
+    expect(
+        &run("name.toml"),
+        here,
+        &["name.toml", "line 5", "did you mean 'stair'"],
+    );
+    expect(
+        &run("empty.toml"),
+        here,
+        &["empty.toml", "line 5", "nothing to run"],
+    );
+    expect(&run("nowhere.toml"), here, &["nowhere.toml"]);
+    expect(
+        &run("metaword"),
+        here,
+        &["metaword", "did you mean 'metaworld'"],
+    );
+    expect(&["experiment", "chek", "--out", "x"], here, &["chek"]);
+    expect(&["experiment", "report", "nowhere"], here, &["nowhere"]);
+    std::fs::write(here.join("rows.jsonl"), "{}\n").expect("a file");
+    expect(
+        &["experiment", "report", "rows.jsonl"],
+        here,
+        &["rows.jsonl", "line 1"],
+    );
+}

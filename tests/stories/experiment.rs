@@ -1,150 +1,178 @@
-//! A grid of runs from one file: kept, taken up again, reported.
+//! A grid of runs: run once, killed in between, gone on with, reported.
 
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use std::process::{Command, Stdio};
 
-const FILE: &str = r#"
+use super::server_process::{ServerProcess, stair, wait_for};
+
+/// Two methods, two seeds, a second or two each.
+const GRID: &str = r#"
 title = "A small grid"
-summary = "Two methods, two seeds."
-
-[[grid]]
-tasks = ["go-fetch-return"]
-methods = ["stair", "uniform"]
-seeds = 2
 set = [
-    "training.total_steps=2400",
-    "training.seed_steps=200",
-    "training.checkpoint_every=300",
-    "feedback.first_step=600",
-    "feedback.every=400",
-    "feedback.queries_per_session=4",
-    "feedback.budget=12",
-    "evaluation.every=600",
-    "evaluation.episodes=3",
-    "agent.hidden=[32, 32]",
-    "agent.batch=64",
-    "reward.hidden=[32, 32]",
-    "temporal.update_every=8",
-    "temporal.batch=64",
+  "training.total_steps=1500", "training.seed_steps=300", "training.checkpoint_every=150",
+  "feedback.first_step=600", "feedback.every=300", "feedback.queries_per_session=5",
+  "feedback.budget=10", "evaluation.every=300", "evaluation.episodes=5",
+  "agent.hidden=[32, 32]", "agent.batch=64", "reward.hidden=[32, 32]",
+  "temporal.update_every=8", "temporal.batch=64", "temporal.block_episodes=2",
+  "environment.n_envs=2",
 ]
+
+[axes]
+tasks = ["go-fetch-return"]
+methods = ["stair", "pebble"]
+seeds = 2
 "#;
 
-fn experiment(action: &str, at: &Path, out: Option<&Path>) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_stair"));
-    command.args(["experiment", action]).arg(at);
-    if let Some(out) = out {
-        command.arg("--out").arg(out);
-    }
-    command.stdin(Stdio::null());
+fn run(here: &Path, out: &str) -> Command {
+    let mut command = stair();
+    command
+        .args([
+            "experiment",
+            "run",
+            "grid.toml",
+            "--jobs",
+            "2",
+            "--out",
+            out,
+        ])
+        .current_dir(here)
+        .stdout(Stdio::piped());
     command
 }
 
-fn run(file: &Path, out: &Path) -> Output {
-    let output = experiment("run", file, Some(out)).output();
-    output.expect("stair experiment run")
+fn said(mut command: Command) -> String {
+    let output = command.stderr(Stdio::piped()).output().expect("stair");
+    let errors = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{errors}");
+    String::from_utf8_lossy(&output.stdout).into_owned()
 }
 
-fn said(output: &Output) -> String {
-    let streams = [output.stdout.as_slice(), output.stderr.as_slice()].concat();
-    String::from_utf8(streams).expect("text")
-}
-
-/// The rows of a run without what differs from one time to the next.
-fn weights(out: &Path, name: &str) -> String {
-    let path = out.join("results").join(format!("{name}.jsonl"));
-    let text = std::fs::read_to_string(path).expect("a result");
-    let first = text.lines().next().expect("a row");
-    let row: serde_json::Value = serde_json::from_str(first).expect("JSON");
-    assert_eq!(row["outcome"], "finished", "{row}");
-    row["weights"].as_str().expect("weights").to_owned()
+/// Name of each finished run with the fingerprint of its weights, in order of names.
+fn finished(rows: &Path) -> Vec<(String, String)> {
+    let text = std::fs::read_to_string(rows).unwrap_or_default();
+    let mut runs: Vec<(String, String)> = text
+        .lines()
+        .map(|line| serde_json::from_str::<serde_json::Value>(line).expect("JSON"))
+        .filter(|row| row["kind"] == "finished")
+        .map(|row| {
+            (
+                format!("{} {}", row["method"], row["seed"]),
+                row["weights"].to_string(),
+            )
+        })
+        .collect();
+    runs.sort();
+    runs
 }
 
 #[test]
-fn a_grid_is_run_once_taken_up_again_and_reported() {
-    let root = tempfile::tempdir().expect("a temporary folder");
-    let file = root.path().join("grid.toml");
-    std::fs::write(&file, FILE).expect("written");
-    let (calm, hunted) = (root.path().join("calm"), root.path().join("hunted"));
-    let output = run(&file, &calm);
-    assert!(output.status.success(), "{}", said(&output));
-    let again = said(&run(&file, &calm));
-    assert!(again.contains("nothing to do"), "{again}");
+fn a_grid_that_is_killed_in_between_ends_as_one_left_alone_and_is_reported() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let here = folder.path();
+    std::fs::write(here.join("grid.toml"), GRID).expect("a file");
 
-    // killed in the middle, its runs stop at checkpoints by themselves and are taken up again
-    let mut child = experiment("run", &file, Some(&hunted))
-        .stdout(Stdio::null())
-        .spawn()
-        .expect("stair experiment run");
-    let metrics = hunted.join("runs/go-fetch-return-stair-1/metrics.jsonl");
-    while !std::fs::read_to_string(&metrics).is_ok_and(|text| text.contains("evaluation")) {
-        std::thread::yield_now();
-    }
-    child.kill().expect("killed");
-    child.wait().expect("it ended");
-    let runs = || std::fs::read_dir(hunted.join("runs")).expect("runs");
-    let is_free = |folder: &Path| {
-        // a run that still writes keeps its log growing; the next command would meet it
-        let log = folder.file_name().expect("a name");
-        let log = hunted.join("logs").join(log).with_extension("log");
-        std::fs::read_to_string(log).is_ok_and(|text| text.contains("Stopped at step"))
-            || std::fs::read_to_string(folder.join("metrics.jsonl"))
-                .is_ok_and(|text| text.contains("\"finished\""))
-    };
-    while !runs().all(|run| is_free(&run.expect("a run").path())) {
-        std::thread::yield_now();
-    }
-    let output = run(&file, &hunted);
-    assert!(output.status.success(), "{}", said(&output));
-    for name in ["stair-1", "uniform-1", "stair-2", "uniform-2"] {
-        let name = format!("go-fetch-return-{name}");
-        assert_eq!(weights(&hunted, &name), weights(&calm, &name), "{name}");
-    }
-
-    let output = experiment("report", &calm, None).output().expect("report");
-    assert!(output.status.success(), "{}", said(&output));
-    let text = said(&output);
+    let first = said(run(here, "calm"));
     assert!(
-        text.contains("# A small grid") && text.contains("| uniform |"),
-        "{text}"
+        first.contains("4 of 4 runs are finished, 0 of them before"),
+        "{first}"
     );
-    for name in [
-        "success.svg",
-        "success.png",
-        "success.csv",
-        "stage-gap.svg",
-        "runs.csv",
-    ] {
-        assert!(calm.join("report").join(name).exists(), "{name}");
-    }
+    let rows = here.join("calm/results.jsonl");
+    let before = std::fs::read(&rows).expect("rows");
+    let again = said(run(here, "calm"));
+    assert!(again.contains("4 of them before this start"), "{again}");
+    assert_eq!(
+        std::fs::read(&rows).expect("rows"),
+        before,
+        "nothing was run twice"
+    );
 
-    let other = root.path().join("other.toml");
-    std::fs::write(&other, FILE.replace("2400", "2600")).expect("written");
-    let output = run(&other, &calm);
-    assert_eq!(output.status.code(), Some(2), "{}", said(&output));
-    assert!(said(&output).contains("total_steps"), "{}", said(&output));
+    let mut hunted = run(here, "hunted").spawn().expect("stair");
+    let started = here.join("hunted/runs/go-fetch-return.stair.oracle.1/config.toml");
+    wait_for("a run to have begun", || started.exists());
+    hunted.kill().expect("SIGKILL");
+    hunted.wait().expect("an ended process");
+    let after_kill = finished(&here.join("hunted/results.jsonl")).len();
+    assert!(after_kill < 4, "the kill came too late to mean anything");
+    let on = said(run(here, "hunted"));
+    assert!(on.contains("4 of 4 runs are finished"), "{on}");
+    let (calm, hunted) = (
+        finished(&rows),
+        finished(&here.join("hunted/results.jsonl")),
+    );
+    assert_eq!(calm.len(), 4);
+    assert_eq!(hunted, calm, "the same weights");
+
+    let report = || {
+        let mut command = stair();
+        command
+            .args(["experiment", "report", "calm"])
+            .current_dir(here);
+        said(command);
+        [
+            "report.md",
+            "success.svg",
+            "success.png",
+            "success.csv",
+            "stage-gaps.svg",
+        ]
+        .map(|name| std::fs::read(here.join("calm/report").join(name)).expect("a file"))
+    };
+    let once = report();
+    assert!(report() == once, "the same bytes");
+    let table = String::from_utf8_lossy(&once[0]).into_owned();
+    assert!(table.contains("| stair − pebble | 2 |"), "{table}");
+    look_at_the_pages(here);
+}
+
+/// What the browser shows of a folder of results.
+fn look_at_the_pages(here: &Path) {
+    let data = here.join("data");
+    std::fs::create_dir_all(data.join("experiments")).expect("a folder");
+    std::fs::rename(here.join("calm"), data.join("experiments/calm")).expect("moved results");
+    std::fs::create_dir_all(data.join("experiments/empty")).expect("a folder");
+    let server = ServerProcess::start(&data);
+    let page = |path: &str| {
+        server
+            .ask("GET", path, None)
+            .as_str()
+            .unwrap_or_default()
+            .to_owned()
+    };
+    let list = page("/experiments");
+    assert!(
+        list.contains("A small grid") && list.contains("/experiments/calm"),
+        "{list}"
+    );
+    let one = page("/experiments/calm");
+    for word in [
+        "4 of 4 runs",
+        "stair − pebble",
+        "/experiments/calm/success.svg",
+        "stage-gaps.svg",
+    ] {
+        assert!(one.contains(word), "'{word}' is not in: {one}");
+    }
+    assert!(page("/experiments/calm/success.svg").starts_with("<svg"));
+    assert!(page("/experiments/calm/success.csv").starts_with("task,method"));
+    assert!(page("/experiments/empty").contains("No run is finished yet"));
 }
 
 #[test]
-fn ready_experiments_and_their_small_variants_are_right() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/experiments");
-    let mut n_files = 0;
-    for entry in std::fs::read_dir(folder).expect("ready files") {
-        let path = entry.expect("an entry").path();
-        for small in [false, true] {
-            let mut check = experiment("check", &path, None);
-            if small {
-                check.arg("--small");
-            }
-            let output = check.output().expect("stair experiment check");
-            assert!(
-                output.status.success(),
-                "{}: {}",
-                path.display(),
-                said(&output)
-            );
-            assert!(said(&output).contains("of this machine"));
-        }
-        n_files += 1;
-    }
-    assert!(n_files >= 8, "{n_files}");
+fn a_run_that_fails_is_marked_and_stops_no_other() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let here = folder.path();
+    let fails = GRID.replace("seeds = 2", "seeds = 1")
+        + "\n[[setting]]\nname = \"small\"\n\n[[setting]]\nname = \"on no card\"\nset = [\"device=cuda:7\"]\n";
+    std::fs::write(here.join("grid.toml"), fails).expect("a file");
+    let output = run(here, "out").output().expect("stair");
+    assert_eq!(output.status.code(), Some(1));
+    let told = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(told.contains("2 of 4 runs are finished"), "{told}");
+    assert!(
+        told.contains("Failed: go-fetch-return.stair.oracle.on-no-card.1:"),
+        "{told}"
+    );
+    assert!(told.contains("CUDA cards"), "{told}");
+    let rows = std::fs::read_to_string(here.join("out/results.jsonl")).expect("rows");
+    assert_eq!(rows.matches("\"kind\":\"failed\"").count(), 2, "{rows}");
 }

@@ -11,6 +11,7 @@ mod experiment;
 mod export;
 mod figure;
 mod golden;
+mod interrupt;
 mod openapi;
 mod render;
 mod serve;
@@ -82,7 +83,7 @@ pub fn main() -> ExitCode {
         Command::Tasks(args) => tasks::run(&args),
         Command::Export(args) => export::run(&args),
         Command::Figure(args) => figure::run(&args),
-        Command::Experiment(args) => experiment::run(&args),
+        Command::Experiment(args) => experiment::run(args),
         Command::Openapi(args) => openapi::run(&args),
     };
     result.unwrap_or_else(|error| {

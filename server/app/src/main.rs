@@ -13,6 +13,7 @@ use std::process::ExitCode;
 mod api;
 mod assets;
 mod cli;
+mod experiments;
 mod extract;
 mod guard;
 mod live;

@@ -2,9 +2,12 @@
 //!
 //! Pages work with forms and links; scripts add keys, preloading and live curves.
 
+pub mod experiment;
+pub mod experiments;
 pub mod guidance;
 pub mod home;
 pub mod label;
+mod markdown;
 pub mod problem;
 pub mod run;
 

@@ -87,6 +87,28 @@ impl Problem {
         )
     }
 
+    /// 404: no experiment has this name, or none of its files.
+    pub fn experiment_not_found(name: &str) -> Self {
+        let detail =
+            format!("There is no experiment or file {name}. All of them are at /experiments.");
+        Self::new(
+            StatusCode::NOT_FOUND,
+            "/problems/experiment-not-found",
+            "There is no such experiment",
+            detail,
+        )
+    }
+
+    /// 500: results that cannot be read or compared.
+    pub fn unreadable_results(detail: impl Into<String>) -> Self {
+        Self::new(
+            StatusCode::INTERNAL_SERVER_ERROR,
+            "/problems/unreadable-results",
+            "These results cannot be shown",
+            detail,
+        )
+    }
+
     /// 401: nobody has said who answers.
     pub fn who_are_you() -> Self {
         let detail =

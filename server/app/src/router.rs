@@ -31,6 +31,7 @@ pub fn router(state: AppState) -> Router {
         .route("/runs/{id}/pause", post(pages::run::pause))
         .route("/runs/{id}/resume", post(pages::run::resume))
         .route("/runs/{id}/stop", post(pages::run::stop))
+        .merge(experiments())
         .merge(api())
         .route("/enter", get(labelers::enter))
         .route("/static/{*path}", get(assets::file))
@@ -42,6 +43,13 @@ pub fn router(state: AppState) -> Router {
         .layer(from_fn(guard::number))
         .layer(compression)
         .with_state(state)
+}
+
+fn experiments() -> Router<AppState> {
+    Router::new()
+        .route("/experiments", get(pages::experiments::page))
+        .route("/experiments/{name}", get(pages::experiment::page))
+        .route("/experiments/{name}/{file}", get(pages::experiment::file))
 }
 
 fn api() -> Router<AppState> {

@@ -19,8 +19,10 @@ mod layers;
 mod presets;
 
 pub use layers::Layers;
-use layers::{invalid, parse_layer};
+pub(crate) use layers::invalid;
+use layers::parse_layer;
 pub use presets::PRESETS;
+pub(crate) use presets::preset_names;
 
 /// Everything that decides what a run does.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -21,6 +21,40 @@ pub fn time_here(config: &RunConfig, spec: &EnvSpec) -> Duration {
     Duration::from_secs_f64(arithmetic + STEP_S * config.training.total_steps as f64)
 }
 
+/// About how long a run takes where each core has a run of its own: nothing happens beside
+/// anything, so the temporal distance counts, and so do the trials.
+pub fn core_time_here(config: &RunConfig, spec: &EnvSpec) -> Duration {
+    let trial = f64::from(config.evaluation.episodes) * f64::from(spec.episode_len);
+    let trials = config.training.total_steps / config.evaluation.every.max(1);
+    let temporal = temporal_gigaflop(config, spec) / (SHARE * gigaflop_per_second());
+    let beside = temporal + STEP_S * trial * trials as f64;
+    time_here(config, spec) + Duration::from_secs_f64(beside)
+}
+
+/// How long runs take on some cores, each run on one, started in this order.
+pub fn on_cores(runs: impl IntoIterator<Item = Duration>, n_cores: usize) -> Duration {
+    let mut busy_until = vec![Duration::ZERO; n_cores.max(1)];
+    for run in runs {
+        if let Some(earliest) = busy_until.iter_mut().min() {
+            *earliest += run;
+        }
+    }
+    busy_until.into_iter().max().unwrap_or_default()
+}
+
+/// Matrix products of all steps of the temporal distance, there and twice as much back; each
+/// pair has two states.
+fn temporal_gigaflop(config: &RunConfig, spec: &EnvSpec) -> f64 {
+    let (t, first) = (&config.temporal, config.feedback.first_step);
+    let learns = method::build(config).is_ok_and(|method| method.learns_temporal_distance());
+    if !learns {
+        return 0.0;
+    }
+    let n_steps = config.training.total_steps.saturating_sub(first) / t.update_every.max(1);
+    let weights = weights(spec.observation_size, &t.hidden, t.latent as usize);
+    n_steps as f64 * 2.0 * 3.0 * 2.0 * t.batch as f64 * weights / 1e9
+}
+
 /// This machine's rate of plain products, measured once (a few hundredths of a second).
 pub fn gigaflop_per_second() -> f64 {
     static RATE: OnceLock<f64> = OnceLock::new();
@@ -104,6 +138,24 @@ mod tests {
         let (config, spec) = resolved("sac", "");
         let gigaflop = sac_update(&config, &spec) / 1e9;
         assert!((gigaflop - 2.30).abs() < 0.05, "{gigaflop}");
+    }
+
+    #[test]
+    fn a_step_of_the_temporal_distance_is_the_known_0_9_gigaflop() {
+        let (mut config, spec) = resolved("stair", "");
+        config.training.total_steps = config.feedback.first_step + 1;
+        let gigaflop = temporal_gigaflop(&config, &spec);
+        assert!((gigaflop - 0.87).abs() < 0.1, "{gigaflop}");
+        config.method = "pebble".into();
+        assert!(temporal_gigaflop(&config, &spec).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_run_waits_for_the_core_that_is_free_first() {
+        let runs = [5, 1, 1, 1].map(Duration::from_secs);
+        assert_eq!(on_cores(runs, 2), Duration::from_secs(5));
+        assert_eq!(on_cores(runs, 1), Duration::from_secs(8));
+        assert_eq!(on_cores([], 2), Duration::ZERO);
     }
 
     #[test]

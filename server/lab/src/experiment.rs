@@ -1,6 +1,7 @@
-//! Experiments that need no simulation: from settings to rows, a table and a figure.
+//! Experiments: those that need no simulation, and grids of runs with their results and reports.
 //!
-//! Pure: the same settings give the same bytes, on any number of threads.
+//! Those without simulation are pure: the same settings give the same bytes, on any number of
+//! threads. A report is pure in its rows.
 
 use std::num::NonZeroUsize;
 
@@ -8,7 +9,10 @@ use crate::config::{ConfigError, unknown};
 use crate::figure::FigureError;
 
 pub mod abstract_mdp;
+pub mod grid;
 pub mod query_counts;
+pub mod report;
+pub mod results;
 
 /// How an experiment is run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -8,7 +8,6 @@ use serde::de::DeserializeOwned;
 use crate::config::{ConfigError, unknown};
 
 mod abstract_mdp;
-mod chart;
 mod curves;
 mod plot;
 mod preference_fit;
@@ -21,12 +20,10 @@ mod seeds;
 mod stage_gaps;
 mod stage_map;
 
+pub use curves::points as curve_points;
 pub use preferences::{PreferenceRow, Preferred};
 pub use rows::{CurveRow, rows_of_run};
-pub use stage_gaps::SessionRow;
-
-pub(crate) use chart::csv_cell;
-pub(crate) use seeds::in_order_of_appearance;
+pub use stage_gaps::points as stage_gap_points;
 
 /// A file of results, read: JSON Lines.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -50,9 +47,6 @@ pub struct Request<'a> {
     pub center: Option<&'a str>,
 }
 
-/// From rows to the text of a figure.
-pub type Make = fn(&Request) -> Result<String, FigureError>;
-
 /// A line of the registry.
 pub struct FigureEntry {
     /// As users type it.
@@ -64,21 +58,19 @@ pub struct FigureEntry {
     /// The choices it leaves, of `x`, `y` and `center`.
     pub choices: &'static [&'static str],
     /// Draws it.
-    pub make: Make,
-    /// Lists every drawn point as CSV, where the figure can.
-    pub list: Option<Make>,
+    pub make: fn(&Request) -> Result<String, FigureError>,
 }
 
 /// All figures.
 pub const FIGURES: &[FigureEntry] = &[
     curves::ENTRY,
-    stage_gaps::ENTRY,
     abstract_mdp::ENTRY,
     query_counts::ENTRY,
     preference_scatter::ENTRY,
     preference_fit::ENTRY,
     same_stage_bars::ENTRY,
     stage_map::ENTRY,
+    stage_gaps::ENTRY,
 ];
 
 /// Why a figure cannot be drawn.
@@ -143,26 +135,6 @@ pub fn find(name: &str) -> Result<&'static FigureEntry, FigureError> {
 /// # Errors
 /// When a row is not one, there are none, or a choice does not exist.
 pub fn make(figure: &'static FigureEntry, request: &Request) -> Result<String, FigureError> {
-    check_choices(figure, request)?;
-    (figure.make)(request)
-}
-
-/// Lists every point of a figure as CSV.
-///
-/// # Errors
-/// As [`make`], and where the figure has no list.
-pub fn list(figure: &'static FigureEntry, request: &Request) -> Result<String, FigureError> {
-    check_choices(figure, request)?;
-    match figure.list {
-        Some(list) => list(request),
-        None => Err(FigureError::Misfit(format!(
-            "{} cannot be listed as CSV; its rows say all that it draws",
-            figure.name
-        ))),
-    }
-}
-
-fn check_choices(figure: &'static FigureEntry, request: &Request) -> Result<(), FigureError> {
     let choices = [
         ("x", request.x),
         ("y", request.y),
@@ -176,7 +148,7 @@ fn check_choices(figure: &'static FigureEntry, request: &Request) -> Result<(), 
             });
         }
     }
-    Ok(())
+    (figure.make)(request)
 }
 
 /// The rows of all sources, in order; empty lines are skipped.
@@ -187,7 +159,7 @@ fn read_rows<T: DeserializeOwned>(
     let mut rows = Vec::new();
     for source in sources {
         for (i, line) in source.text.lines().enumerate() {
-            if line.trim().is_empty() {
+            if line.trim().is_empty() || is_of_another_kind(figure, line) {
                 continue;
             }
             rows.push(
@@ -206,6 +178,20 @@ fn read_rows<T: DeserializeOwned>(
         });
     }
     Ok(rows)
+}
+
+/// Rows of an experiment's results say what they are; a figure passes over those of other kinds.
+fn is_of_another_kind(figure: &FigureEntry, line: &str) -> bool {
+    #[derive(serde::Deserialize)]
+    struct Kind {
+        kind: String,
+    }
+    let wanted = match figure.name {
+        "curves" => "evaluation",
+        "stage-gaps" => "session",
+        _ => return false,
+    };
+    serde_json::from_str::<Kind>(line).is_ok_and(|row| row.kind != wanted)
 }
 
 /// The value of a choice: the first one where nothing was asked for.

@@ -8,13 +8,11 @@ pub mod cost;
 pub mod evaluate;
 pub mod experiment;
 pub mod figure;
-pub mod grid;
 pub mod memory;
 pub mod message;
 pub mod method;
 pub mod nearest;
 pub mod policy;
-pub mod report;
 pub mod run;
 
 mod candidates;

@@ -1,53 +1,71 @@
-//! `stair experiment`: grids of runs and what they came to, and the paper's experiments that need
-//! no simulation.
+//! `stair experiment`: grids of runs, their reports, and the paper's experiments that need no
+//! simulation.
 
 use std::fmt::Write as _;
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Subcommand;
-use lab::experiment::EXPERIMENTS;
+use lab::experiment::grid::{self, Grid, GridText, SHIPPED};
+use lab::experiment::{self, EXPERIMENTS, Settings};
+
+use super::BadInput;
+use super::figure::{Format, encode, write};
 
 mod check;
-mod folder;
-mod machine;
-mod progress;
-mod pure;
+mod pool;
 mod report;
 mod run;
 
-/// Run a grid of runs from a file and report on it, or an experiment that needs no simulation
+/// Run an experiment, as far as it has not run yet, and report what came out
 #[derive(Debug, clap::Args)]
-#[command(
-    args_conflicts_with_subcommands = true,
-    subcommand_negates_reqs = true,
-    after_help = after_help()
-)]
+#[command(after_help = after_help())]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 pub struct Args {
     #[command(subcommand)]
-    action: Option<Action>,
-    #[command(flatten)]
-    pure: Option<pure::Args>,
+    command: Option<Command>,
+    /// An experiment that needs no simulation
+    #[arg(required = true)]
+    name: Option<String>,
+    /// Folder for what it makes
+    #[arg(long, value_name = "DIR", required = true)]
+    out: Option<PathBuf>,
+    /// Independent repetitions
+    #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u64).range(1..=10_000))]
+    seeds: u64,
+    /// Threads [default: one for each processor]; changes no number
+    #[arg(long)]
+    threads: Option<NonZeroUsize>,
 }
 
 #[derive(Debug, Subcommand)]
-enum Action {
-    Check(check::Args),
+enum Command {
     Run(run::Args),
+    Check(check::Args),
+    List(check::ListArgs),
     Report(report::Args),
 }
 
 fn after_help() -> String {
-    let mut text = "Experiments that need no simulation:\n".to_owned();
+    let mut text = "Experiments without simulation:\n".to_owned();
     for experiment in EXPERIMENTS {
-        writeln!(text, "  {:14} {}", experiment.name, experiment.summary)
+        writeln!(text, "  {:22} {}", experiment.name, experiment.summary)
             .expect("writing to a string cannot fail");
     }
+    let names: Vec<&str> = SHIPPED.iter().map(|shipped| shipped.name).collect();
+    writeln!(
+        text,
+        "\nGrids of runs that come with the program (or a FILE.toml of your own):\n  {}",
+        names.join(", ")
+    )
+    .expect("writing to a string cannot fail");
     text.push_str(
         "\nExamples:
-  stair experiment abstract-mdp --out results/abstract-mdp
-  stair experiment check assets/experiments/window.toml
-  stair experiment run assets/experiments/go-fetch-return.toml --small
-  stair experiment report data/experiments/go-fetch-return-small",
+  stair experiment list                        what each grid costs on this machine
+  stair experiment run go-fetch-return --small --out results/small
+  stair experiment report results/small
+  stair experiment abstract-mdp --out results/abstract-mdp",
     );
     text
 }
@@ -55,14 +73,103 @@ fn after_help() -> String {
 /// Runs the command.
 ///
 /// # Errors
-/// [`BadInput`](super::BadInput) for a file or name that does not fit; a folder that cannot be
+/// [`BadInput`] for an unknown experiment or a file that does not fit; a folder that cannot be
 /// written.
-pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
-    match (&args.action, &args.pure) {
-        (Some(Action::Check(args)), _) => check::run(args),
-        (Some(Action::Run(args)), _) => run::run(args),
-        (Some(Action::Report(args)), _) => report::run(args),
-        (None, Some(args)) => pure::run(args),
-        (None, None) => unreachable!("clap asks for a subcommand or a name"),
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    match args.command {
+        Some(Command::Run(args)) => run::run(&args),
+        Some(Command::Check(args)) => check::run(&args),
+        Some(Command::List(_)) => Ok(check::list()),
+        Some(Command::Report(args)) => report::run(&args),
+        None => without_simulation(&args),
+    }
+}
+
+fn without_simulation(args: &Args) -> anyhow::Result<ExitCode> {
+    let (Some(name), Some(out)) = (&args.name, &args.out) else {
+        return Err(BadInput("name an experiment and its --out".into()).into());
+    };
+    if grid::shipped(name).is_ok() {
+        let told = format!("'{name}' is a grid of runs: stair experiment run {name}");
+        return Err(BadInput(told).into());
+    }
+    let experiment = experiment::find(name).map_err(BadInput::from_error)?;
+    let settings = Settings {
+        n_seeds: args.seeds,
+        n_threads: args.threads.unwrap_or_else(processors),
+    };
+    for artifact in (experiment.run)(settings)? {
+        write_with_picture(&out.join(artifact.name), artifact.text)?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Writes a text, and beside an SVG the same as PNG; says what is there now.
+fn write_with_picture(path: &Path, text: String) -> anyhow::Result<()> {
+    write(path, text.as_bytes())?;
+    println!("{}", path.display());
+    if Format::of(path).ok() == Some(Format::Svg) {
+        let picture = path.with_extension("png");
+        write(&picture, &encode(text, Format::Png, 2.0)?)?;
+        println!("{}", picture.display());
+    }
+    Ok(())
+}
+
+fn processors() -> NonZeroUsize {
+    std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN)
+}
+
+/// A grid as the command line names it, with its text and a short name for its folder.
+struct Chosen {
+    grid: Grid,
+    text: String,
+    stem: String,
+}
+
+impl Chosen {
+    /// A file, or the name of one that comes with the program.
+    fn open(name: &str, is_small: bool) -> anyhow::Result<Self> {
+        let path = Path::new(name);
+        let (text, stem) = if path.exists() || path.extension().is_some_and(|e| e == "toml") {
+            let text = std::fs::read_to_string(path)
+                .map_err(|error| BadInput(format!("cannot read {name}: {error}")))?;
+            let stem = path.file_stem().unwrap_or_default();
+            (text, stem.to_string_lossy().into_owned())
+        } else {
+            let shipped = grid::shipped(name).map_err(BadInput::from_error)?;
+            (shipped.text.to_owned(), name.to_owned())
+        };
+        let source = GridText { name, text: &text };
+        let grid = grid::resolve(source, is_small).map_err(BadInput::from_error)?;
+        let stem = if is_small {
+            format!("{stem}-small")
+        } else {
+            stem
+        };
+        Ok(Self { grid, text, stem })
+    }
+}
+
+/// `3 h 20 min`, for people who plan their week.
+fn in_words(time: std::time::Duration) -> String {
+    let minutes = time.as_secs().div_ceil(60);
+    match (minutes / 1440, minutes / 60 % 24, minutes % 60) {
+        (0, 0, minutes) => format!("{minutes} min"),
+        (0, hours, minutes) => format!("{hours} h {minutes} min"),
+        (days, hours, _) => format!("{days} d {hours} h"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::in_words;
+    use std::time::Duration;
+
+    #[test]
+    fn times_are_told_as_coarsely_as_they_are_known() {
+        let words =
+            [40, 3_600 + 1_200, 2 * 86_400 + 3_600 * 5].map(|s| in_words(Duration::from_secs(s)));
+        assert_eq!(words, ["1 min", "1 h 20 min", "2 d 5 h"]);
     }
 }

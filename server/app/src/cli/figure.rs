@@ -32,7 +32,7 @@ pub struct Args {
     /// How several seeds become one line: mean, or iqm, the mean of the middle half
     #[arg(long, value_name = "HOW")]
     center: Option<String>,
-    /// Where to write it; .svg, .png, or .csv with every drawn point
+    /// Where to write it; .svg or .png
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
     /// Pixels of a PNG for each unit of the figure
@@ -78,12 +78,8 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         y: args.y.as_deref(),
         center: args.center.as_deref(),
     };
-    let text = match format {
-        Format::Csv => figure::list(figure, &request),
-        Format::Svg | Format::Png => figure::make(figure, &request),
-    };
-    let text = text.map_err(BadInput::from_error)?;
-    write(&args.out, &encode(text, format, args.scale)?)?;
+    let svg = figure::make(figure, &request).map_err(BadInput::from_error)?;
+    write(&args.out, &encode(svg, format, args.scale)?)?;
     Ok(ExitCode::SUCCESS)
 }
 

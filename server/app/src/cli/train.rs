@@ -14,6 +14,7 @@ use lab::run::{Outcome, Run};
 use serde_json::json;
 
 use super::BadInput;
+use super::interrupt::on_interrupt;
 
 /// Train an agent with a scripted teacher.
 #[derive(Debug, clap::Args)]
@@ -62,9 +63,9 @@ pub struct Args {
     /// No progress bar; one JSON object at the end
     #[arg(long)]
     json: bool,
-    /// Stop at a checkpoint when standard input ends: for programs that start runs
+    /// Stop with a checkpoint when stdin ends: for programs that start this one
     #[arg(long)]
-    stop_at_eof: bool,
+    until_eof: bool,
 }
 
 /// Runs the command.
@@ -80,10 +81,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let judge = judge(&args.teacher, run.config().seed, &run.config().teacher)?;
     let mut teacher = Scripted::new(judge, run.consumed_sequence());
     let (sender, commands) = channel();
-    if args.stop_at_eof {
-        stop_at_eof(sender.clone());
-    }
-    stop_on_interrupt(sender)?;
+    stop_when_told(sender, args.until_eof)?;
     let started = Instant::now();
     let mut progress = Progress::new(&run, args.json);
     let outcome = run.drive(&mut teacher, &commands, &mut |event| progress.show(&event))?;
@@ -202,35 +200,19 @@ pub(super) fn judge(
     })
 }
 
-fn stop_at_eof(sender: Sender<Command>) {
-    std::thread::spawn(move || {
-        let mut input = std::io::stdin().lock();
-        let _ = std::io::copy(&mut input, &mut std::io::sink()); // an error is an end as well
-        let _ = sender.send(Command::Stop); // a run that is over needs no telling
-    });
-}
-
-/// The first Ctrl-C leaves a checkpoint.
-pub(super) fn stop_on_interrupt(sender: Sender<Command>) -> anyhow::Result<()> {
-    let runtime = tokio::runtime::Builder::new_current_thread()
-        .enable_all()
-        .build();
-    let runtime = runtime.context("cannot listen for Ctrl-C")?;
-    std::thread::spawn(move || {
-        let heard = runtime.block_on(async {
-            let mut terminate =
-                tokio::signal::unix::signal(tokio::signal::unix::SignalKind::terminate())?;
-            tokio::select! {
-                heard = tokio::signal::ctrl_c() => heard,
-                _ = terminate.recv() => Ok(()),
-            }
-        });
-        if heard.is_ok() {
-            eprintln!("Stopping; a checkpoint is being written.");
+/// Ctrl-C, or the end of stdin where that is asked for, leaves a checkpoint.
+fn stop_when_told(sender: Sender<Command>, until_eof: bool) -> anyhow::Result<()> {
+    if until_eof {
+        let sender = sender.clone();
+        std::thread::spawn(move || {
+            let _ = std::io::copy(&mut std::io::stdin(), &mut std::io::sink()); // to its end, however it comes
             let _ = sender.send(Command::Stop); // a run that is over needs no telling
-        }
-    });
-    Ok(())
+        });
+    }
+    on_interrupt(move || {
+        eprintln!("Stopping; a checkpoint is being written.");
+        let _ = sender.send(Command::Stop); // a run that is over needs no telling
+    })
 }
 
 /// A line in the terminal that says where the run is.

@@ -53,12 +53,7 @@ impl Bootstrap {
             })
             .filter(|value| !value.is_nan())
             .collect();
-        replicates.sort_by(f64::total_cmp);
-        let tail = (1.0 - self.level) / 2.0;
-        (!replicates.is_empty()).then(|| Interval {
-            lo: quantile(&replicates, tail),
-            hi: quantile(&replicates, 1.0 - tail),
-        })
+        (!replicates.is_empty()).then(|| self.percentiles(&mut replicates))
     }
 
     /// A centre of independent values, such as [`mean`] or the interquartile mean over seeds;
@@ -74,6 +69,40 @@ impl Bootstrap {
             value: center(values),
             interval,
         })
+    }
+
+    /// A centre of all values of several strata, such as the seeds of several tasks: each replicate
+    /// draws within each stratum as many as it has. `None` where there is no value.
+    ///
+    /// Source: Agarwal et al. (2021), section 4.1.
+    pub fn stratified(&self, strata: &[Vec<f64>], center: fn(&[f64]) -> f64) -> Option<Estimate> {
+        let values = strata.concat();
+        let mut drawn = Vec::with_capacity(values.len());
+        let mut replicates: Vec<f64> = (0..self.n_replicates)
+            .map(|k| {
+                let mut rng = Rng::new(self.seed, Stream::Bootstrap, u64::from(k));
+                drawn.clear();
+                for stratum in strata {
+                    drawn.extend(stratum.iter().map(|_| stratum[rng.below(stratum.len())]));
+                }
+                center(&drawn)
+            })
+            .collect();
+        let value = center(&values);
+        (!values.is_empty()).then(|| Estimate {
+            value,
+            interval: self.percentiles(&mut replicates),
+        })
+    }
+
+    /// Both ends of the middle part of the replicates, of which there is at least one.
+    fn percentiles(&self, replicates: &mut [f64]) -> Interval {
+        replicates.sort_by(f64::total_cmp);
+        let tail = (1.0 - self.level) / 2.0;
+        Interval {
+            lo: quantile(replicates, tail),
+            hi: quantile(replicates, 1.0 - tail),
+        }
     }
 
     /// Mean of `first − second` over pairs, such as two methods on the same seeds; `None`
@@ -159,6 +188,43 @@ mod tests {
         };
         assert_eq!(with_seed(1), with_seed(1));
         assert_ne!(with_seed(1), with_seed(2));
+    }
+
+    /// Every way to draw three of three, counted; the interval's ends by their cumulative shares.
+    #[test]
+    fn the_interval_of_three_values_is_that_of_all_27_draws() {
+        let values = [0.0, 0.4, 1.0];
+        let mut all: Vec<f64> = (0..27)
+            .map(|n| [n % 3, n / 3 % 3, n / 9].map(|k| values[k]))
+            .map(|drawn| mean(&drawn))
+            .collect();
+        all.sort_by(f64::total_cmp);
+        // 1/27 of the draws are 0, 3/27 are 2/15 …: at a level of 0.8 the tails of 0.1 end
+        // within the second and the second to last kind.
+        let [lo, hi] = [all[(0.1 * 27.0) as usize], all[(0.9 * 27.0) as usize]];
+        assert!(
+            (lo - 0.4 / 3.0).abs() < 1e-12 && (hi - 0.8).abs() < 1e-12,
+            "{lo} {hi}"
+        );
+        let settings = Bootstrap {
+            level: 0.8,
+            n_replicates: 5_000,
+            seed: 0,
+        };
+        let found = settings.center(&values, mean).unwrap();
+        assert!((found.interval.lo - lo).abs() < 1e-12 && (found.interval.hi - hi).abs() < 1e-12);
+        let one_stratum = settings.stratified(&[values.to_vec()], mean).unwrap();
+        assert_eq!(one_stratum, found);
+    }
+
+    #[test]
+    fn strata_keep_their_share_in_every_replicate() {
+        let strata = [vec![0.0; 5], vec![1.0; 15]];
+        let settings = Bootstrap::default();
+        let found = settings.stratified(&strata, mean).unwrap();
+        assert!((found.interval.hi - found.interval.lo).abs() < 1e-12);
+        assert!((found.value - 0.75).abs() < 1e-12);
+        assert_eq!(settings.stratified(&[vec![], vec![]], mean), None);
     }
 
     #[test]

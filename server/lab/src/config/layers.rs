@@ -96,7 +96,8 @@ fn parse_override(text: &str) -> Result<Table, ConfigError> {
     parse_layer(&origin, &format!("{key} = {value}"))
 }
 
-pub(super) fn invalid(origin: &str, text: &str, error: &toml::de::Error) -> ConfigError {
+/// An error of TOML with its line, and the nearest right key where one is unknown.
+pub(crate) fn invalid(origin: &str, text: &str, error: &toml::de::Error) -> ConfigError {
     let line = error
         .span()
         .map(|span| 1 + text[..span.start.min(text.len())].matches('\n').count());

@@ -12,6 +12,15 @@ use super::{ConfigError, unknown};
 /// there of its kind, and nothing else.
 pub const PRESETS: &[(&str, &str, &str)] = include!(concat!(env!("OUT_DIR"), "/presets.rs"));
 
+/// Names of presets, each once; tasks bring their own without being asked.
+pub(crate) fn preset_names() -> Vec<&'static str> {
+    let names = PRESETS.iter().map(|(name, _, _)| *name);
+    let mut known: Vec<&str> = names.filter(|name| *name != "task").collect();
+    known.sort_unstable();
+    known.dedup();
+    known
+}
+
 /// A preset's own keys.
 ///
 /// # Errors
@@ -21,13 +30,7 @@ pub(super) fn preset(name: &str, task: &str) -> Result<Table, ConfigError> {
         .iter()
         .find(|(n, t, _)| *n == name && (t.is_empty() || *t == task));
     let Some((_, _, text)) = found else {
-        let mut known: Vec<&str> = PRESETS
-            .iter()
-            .map(|(n, _, _)| *n)
-            .filter(|n| *n != "task")
-            .collect();
-        known.dedup();
-        return Err(unknown("preset", name, known.into_iter()));
+        return Err(unknown("preset", name, preset_names().into_iter()));
     };
     parse_layer(&format!("preset {name}"), text)
 }

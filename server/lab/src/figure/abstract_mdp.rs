@@ -13,7 +13,6 @@ pub(super) const ENTRY: FigureEntry = FigureEntry {
     input: "the abstract-mdp.jsonl of `stair experiment abstract-mdp`",
     choices: &[],
     make,
-    list: None,
 };
 
 type Column = fn(&Outcome) -> f64;

@@ -1,7 +1,16 @@
 //! Learning curves: one panel a task, one line a method, every seed thin behind.
 
-use super::chart::{Chart, Point};
-use super::{CurveRow, FigureEntry, FigureError, Request, choose, make_center, read_rows};
+use std::collections::BTreeMap;
+
+use super::plot::{Entry, Labels, Panel, Scale, Sheet, series};
+use super::seeds::{
+    BAND, Curve, add_line, draw_seeds, drawn_lines, in_order_of_appearance, quoted,
+};
+use super::{
+    Center, CurveRow, FigureEntry, FigureError, Request, choose, make_center, read_rows,
+    shown_method,
+};
+use crate::method::METHODS;
 
 pub(super) const ENTRY: FigureEntry = FigureEntry {
     name: "curves",
@@ -9,46 +18,211 @@ pub(super) const ENTRY: FigureEntry = FigureEntry {
     input: "task, method, seed, setting, step, labels, success_rate, return_mean, wall_s; or the folders of runs",
     choices: &["x", "y", "center"],
     make,
-    list: Some(list),
 };
 
 type Column = fn(&CurveRow) -> f64;
 
+/// Method and setting: what shares a line.
+type Group = (String, String);
+
+/// What the axes show.
+#[derive(Clone, Copy)]
+struct Axes {
+    x: (&'static str, Column),
+    y: (&'static str, Column),
+    is_rate: bool,
+}
+
+/// What is drawn, before it is.
+struct Plan {
+    axes: Axes,
+    center: Center,
+    rows: Vec<CurveRow>,
+    tasks: Vec<String>,
+    groups: Vec<Group>,
+}
+
+impl Plan {
+    fn of(request: &Request) -> Result<Self, FigureError> {
+        let steps: (&str, Column) = ("Environment steps", |row| row.step as f64);
+        let labels: (&str, Column) = ("Labels", |row| f64::from(row.labels));
+        let success: (&str, Column) = ("Success (%)", |row| 100.0 * row.success_rate);
+        let returns: (&str, Column) = ("Return", |row| row.return_mean);
+        let axes = Axes {
+            x: choose("x", request.x, &[("step", steps), ("labels", labels)])?,
+            y: choose(
+                "y",
+                request.y,
+                &[("success_rate", success), ("return_mean", returns)],
+            )?,
+            is_rate: request.y != Some("return_mean"),
+        };
+        let center = make_center(request.center)?;
+        let rows: Vec<CurveRow> = read_rows(&ENTRY, request.sources)?;
+        Ok(Self {
+            axes,
+            center,
+            tasks: in_order_of_appearance(rows.iter().map(|row| row.task.clone())),
+            groups: groups(&rows),
+            rows,
+        })
+    }
+
+    /// The curves of each group on a task, each with its seed.
+    fn curves(&self, task: &str) -> Result<Vec<Vec<(u64, Curve)>>, FigureError> {
+        let rows: Vec<&CurveRow> = self.rows.iter().filter(|row| row.task == task).collect();
+        let of_group = |group| curves(&rows, group, self.axes);
+        self.groups.iter().map(of_group).collect()
+    }
+}
+
 fn make(request: &Request) -> Result<String, FigureError> {
-    chart(request)?.draw()
-}
-
-fn list(request: &Request) -> Result<String, FigureError> {
-    chart(request)?.csv()
-}
-
-fn chart(request: &Request) -> Result<Chart, FigureError> {
-    let steps: (&str, Column) = ("Environment steps", |row| row.step as f64);
-    let labels: (&str, Column) = ("Labels", |row| f64::from(row.labels));
-    let success: (&str, Column) = ("Success (%)", |row| 100.0 * row.success_rate);
-    let returns: (&str, Column) = ("Return", |row| row.return_mean);
-    let x = choose("x", request.x, &[("step", steps), ("labels", labels)])?;
-    let y = choose(
-        "y",
-        request.y,
-        &[("success_rate", success), ("return_mean", returns)],
-    )?;
-    let rows: Vec<CurveRow> = read_rows(&ENTRY, request.sources)?;
-    let point = |row: CurveRow| Point {
-        at: ((x.1)(&row), (y.1)(&row)),
-        task: row.task,
-        method: row.method,
-        setting: row.setting,
-        seed: row.seed,
-        step: row.step,
+    let plan = Plan::of(request)?;
+    let (axes, tasks) = (plan.axes, &plan.tasks);
+    let key: Vec<Entry> = plan
+        .groups
+        .iter()
+        .enumerate()
+        .map(|(n, group)| Entry {
+            look: series(n),
+            name: key_name(group, &plan.rows),
+            has_line: true,
+        })
+        .collect();
+    let size = if tasks.len() == 1 {
+        (440.0, 250.0)
+    } else {
+        (270.0, 180.0)
     };
-    Ok(Chart {
-        points: rows.into_iter().map(point).collect(),
-        x: x.0,
-        y: y.0,
-        is_rate: request.y != Some("return_mean"),
-        center: make_center(request.center)?,
-    })
+    let sheet = Sheet::new(tasks.len(), 3, size, key).noted(BAND);
+    let mut svg = sheet.start();
+    for (n, task) in tasks.iter().enumerate() {
+        let curves = plan.curves(task)?;
+        let curves: Vec<Vec<Curve>> = curves
+            .into_iter()
+            .map(|seeds| seeds.into_iter().map(|(_, curve)| curve).collect())
+            .collect();
+        let points = || curves.iter().flatten().flatten();
+        let panel = Panel {
+            frame: sheet.frame(n),
+            x: Scale::exact(
+                0.0,
+                points().fold(0.0, |greatest: f64, p| greatest.max(p.0)),
+            ),
+            y: if axes.is_rate {
+                Scale::exact(0.0, 100.0)
+            } else {
+                Scale::around(points().map(|p| p.1).chain([0.0]), 5)
+            },
+        };
+        let labels = Labels {
+            title: task,
+            x: axes.x.0,
+            y: axes.y.0,
+        };
+        panel.draw_axes(&mut svg, labels);
+        draw_seeds(&mut svg, &panel, &curves, plan.center);
+    }
+    let title = format!("{} over {}, by method", axes.y.0, axes.x.0.to_lowercase());
+    Ok(svg.finish(&title))
+}
+
+/// Every point of the figure as CSV: those of each seed, of the centres, and of both ends of the
+/// bands.
+///
+/// # Errors
+/// As for drawing it.
+pub fn points(request: &Request) -> Result<String, FigureError> {
+    let plan = Plan::of(request)?;
+    let mut csv = String::from("task,method,setting,line,x,y\n");
+    for task in &plan.tasks {
+        for ((method, setting), seeds) in plan.groups.iter().zip(plan.curves(task)?) {
+            let named = |line: String| format!("{task},{method},{},{line}", quoted(setting));
+            for (seed, curve) in &seeds {
+                add_line(&mut csv, &named(format!("seed {seed}")), curve);
+            }
+            let curves: Vec<Curve> = seeds.into_iter().map(|(_, curve)| curve).collect();
+            for (line, curve) in drawn_lines(&curves, plan.center) {
+                add_line(&mut csv, &named(line.to_owned()), &curve);
+            }
+        }
+    }
+    Ok(csv)
+}
+
+/// The curve of each seed of a group, in order of seed.
+fn curves(rows: &[&CurveRow], group: &Group, axes: Axes) -> Result<Vec<(u64, Curve)>, FigureError> {
+    let mut seeds: BTreeMap<u64, BTreeMap<u64, &CurveRow>> = BTreeMap::new();
+    for row in rows.iter().filter(|row| is_in(row, group)) {
+        if seeds
+            .entry(row.seed)
+            .or_default()
+            .insert(row.step, row)
+            .is_some()
+        {
+            let setting = match row.setting.as_str() {
+                "" => String::new(),
+                setting => format!(" ({setting})"),
+            };
+            return Err(FigureError::Misfit(format!(
+                "step {} of {} with {}{setting}, seed {}, is given twice",
+                row.step, row.task, row.method, row.seed
+            )));
+        }
+    }
+    let curve = |steps: BTreeMap<u64, &CurveRow>| {
+        let mut curve = Curve::new();
+        for row in steps.values() {
+            let point = ((axes.x.1)(row), (axes.y.1)(row));
+            match curve.last_mut() {
+                // Once the budget is spent the number of labels stands still: the last one counts.
+                Some(last) if last.0 >= point.0 => last.1 = point.1,
+                _ => curve.push(point),
+            }
+        }
+        curve
+    };
+    let curves = seeds.into_iter().map(|(seed, steps)| (seed, curve(steps)));
+    Ok(curves.collect())
+}
+
+/// Methods in the registry's order, others after them; settings in order of appearance.
+fn groups(rows: &[CurveRow]) -> Vec<Group> {
+    let all = rows
+        .iter()
+        .map(|row| (row.method.clone(), row.setting.clone()));
+    let mut groups = in_order_of_appearance(all);
+    let rank = |method: &str| METHODS.iter().position(|m| m.name == method);
+    groups.sort_by_key(|(method, _)| rank(method).unwrap_or(METHODS.len()));
+    groups
+}
+
+fn is_in(row: &CurveRow, (method, setting): &Group) -> bool {
+    row.method == *method && row.setting == *setting
+}
+
+/// "STAIR, N = 500 (5 seeds)".
+fn key_name(group: &Group, rows: &[CurveRow]) -> String {
+    let mut seeds: BTreeMap<&str, Vec<u64>> = BTreeMap::new();
+    for row in rows.iter().filter(|row| is_in(row, group)) {
+        let of_task = seeds.entry(&row.task).or_default();
+        if !of_task.contains(&row.seed) {
+            of_task.push(row.seed);
+        }
+    }
+    let least = seeds.values().map(Vec::len).min().unwrap_or(0);
+    let most = seeds.values().map(Vec::len).max().unwrap_or(0);
+    let n_seeds = match (least, most) {
+        (1, 1) => "1 seed".to_owned(),
+        (least, most) if least == most => format!("{most} seeds"),
+        (least, most) => format!("{least}–{most} seeds"),
+    };
+    let method = shown_method(&group.0);
+    if group.1.is_empty() {
+        format!("{method} ({n_seeds})")
+    } else {
+        format!("{method}, {} ({n_seeds})", group.1)
+    }
 }
 
 #[cfg(test)]
@@ -90,6 +264,28 @@ mod tests {
             "the registry's order"
         );
         assert_eq!(draw(text).unwrap(), svg, "the same bytes");
+    }
+
+    #[test]
+    fn every_plotted_point_can_be_had_as_a_number() {
+        let text = row("stair", 1, 0, 0.0) + &row("stair", 2, 0, 0.5) + &row("stair", 3, 0, 1.0);
+        let sources = [Source {
+            name: "rows.jsonl".into(),
+            text,
+        }];
+        let request = Request {
+            sources: &sources,
+            ..Request::default()
+        };
+        let csv = points(&request).unwrap();
+        let lines: Vec<&str> = csv.lines().collect();
+        assert_eq!(lines[1], "window-open,stair,,seed 1,0,0");
+        assert_eq!(lines[3], "window-open,stair,,seed 3,0,100");
+        assert_eq!(lines[4], "window-open,stair,,centre,0,50");
+        assert!(
+            lines[5].starts_with("window-open,stair,,lo,0,") && lines.len() == 7,
+            "{csv}"
+        );
     }
 
     #[test]

@@ -13,7 +13,6 @@ pub(super) const ENTRY: FigureEntry = FigureEntry {
     input: INPUT,
     choices: &[],
     make,
-    list: None,
 };
 
 const LEVEL: f64 = 0.95;

@@ -13,7 +13,6 @@ pub(super) const ENTRY: FigureEntry = FigureEntry {
     input: INPUT,
     choices: &[],
     make,
-    list: None,
 };
 
 const NOTE: &str = "Above the broken line σ₁ starts later: whoever prefers later segments answers σ₁ there \

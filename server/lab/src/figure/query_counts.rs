@@ -14,7 +14,6 @@ pub(super) const ENTRY: FigureEntry = FigureEntry {
     input: "the query-counts.jsonl of `stair experiment query-counts`",
     choices: &[],
     make,
-    list: None,
 };
 
 type Formula = fn(&Counts) -> f64;

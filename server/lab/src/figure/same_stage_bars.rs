@@ -15,7 +15,6 @@ pub(super) const ENTRY: FigureEntry = FigureEntry {
     input: "task, method, same (true or false); one judgement each",
     choices: &[],
     make,
-    list: None,
 };
 
 const LEVEL: f64 = 0.95;

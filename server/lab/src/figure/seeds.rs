@@ -41,16 +41,14 @@ pub(super) fn draw_seeds(
 }
 
 /// The centre of a group's seeds with its interval.
-pub(super) struct Line {
-    /// Left to right.
-    pub(super) center: Curve,
-    /// Place, least and greatest.
-    pub(super) band: Vec<(f64, f64, f64)>,
+struct Line {
+    center: Curve,
+    band: Vec<(f64, f64, f64)>,
 }
 
 impl Line {
     /// Where all seeds have been evaluated; straight lines between evaluations.
-    pub(super) fn of(seeds: &[Curve], center: fn(&[f64]) -> f64) -> Self {
+    fn of(seeds: &[Curve], center: fn(&[f64]) -> f64) -> Self {
         let mut line = Self {
             center: Vec::new(),
             band: Vec::new(),
@@ -92,8 +90,36 @@ fn interpolate(curve: &[(f64, f64)], x: f64) -> f64 {
     }
 }
 
+/// What is drawn of a group beside its seeds: the centre, and both ends of the band.
+pub(super) fn drawn_lines(
+    seeds: &[Curve],
+    center: fn(&[f64]) -> f64,
+) -> [(&'static str, Curve); 3] {
+    let line = Line::of(seeds, center);
+    let lo = line.band.iter().map(|&(x, lo, _)| (x, lo)).collect();
+    let hi = line.band.iter().map(|&(x, _, hi)| (x, hi)).collect();
+    [("centre", line.center), ("lo", lo), ("hi", hi)]
+}
+
+/// The points of a line as rows of CSV behind what the line is.
+pub(super) fn add_line(csv: &mut String, line: &str, points: &[(f64, f64)]) {
+    for (x, y) in points {
+        let row = format!("{line},{x},{y}\n");
+        csv.push_str(&row);
+    }
+}
+
+/// A text as a field of CSV (RFC 4180).
+pub(super) fn quoted(text: &str) -> String {
+    if text.contains([',', '"', '\n']) {
+        format!("\"{}\"", text.replace('"', "\"\""))
+    } else {
+        text.to_owned()
+    }
+}
+
 /// Each value once.
-pub(crate) fn in_order_of_appearance<T: PartialEq>(values: impl IntoIterator<Item = T>) -> Vec<T> {
+pub(super) fn in_order_of_appearance<T: PartialEq>(values: impl IntoIterator<Item = T>) -> Vec<T> {
     let mut seen = Vec::new();
     for value in values {
         if !seen.contains(&value) {

@@ -1,139 +1,168 @@
-//! How far apart in the task the two segments of chosen queries are, session by session: the
-//! curriculum that nobody wrote down.
+//! How far the segments of a pair are apart in the task, of chosen pairs and of all candidates:
+//! where the chosen ones lie below, the queries climb through the task stage by stage.
 
-use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
-use super::chart::{Chart, Point};
-use super::{FigureEntry, FigureError, Request, choose, make_center, read_rows};
+use domain::agreement::interquartile_mean;
+
+use super::plot::{Entry, Labels, Panel, Scale, Sheet, series};
+use super::seeds::{
+    BAND, Curve, add_line, draw_seeds, drawn_lines, in_order_of_appearance, quoted,
+};
+use super::{FigureEntry, FigureError, Request, read_rows, shown_method};
+use crate::experiment::grid::RunKey;
+use crate::experiment::results::{Content, Row};
 
 pub(super) const ENTRY: FigureEntry = FigureEntry {
     name: "stage-gaps",
-    summary: "stage gap of chosen queries by session, and their share in one true stage",
-    input: "task, method, seed, setting, session, step, stage_gap_chosen, stage_gap_pool, same_stage_chosen",
-    choices: &["y", "center"],
+    summary: "stage gap of chosen pairs against all candidates, over environment steps",
+    input: "the results of an experiment, from methods that have a stage gap",
+    choices: &[],
     make,
-    list: Some(list),
 };
 
-/// A session of one run.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct SessionRow {
-    /// The task's name.
-    pub task: String,
-    /// The method's name.
-    pub method: String,
-    /// Of the run.
-    pub seed: u64,
-    /// What else differs between groups of runs; may be empty.
-    #[serde(default)]
-    pub setting: String,
-    /// Round of asking, from 0.
-    pub session: u32,
-    /// Environment steps taken.
-    pub step: u64,
-    /// Mean stage gap of the chosen queries, nats, where the method has one.
-    pub stage_gap_chosen: Option<f64>,
-    /// Mean stage gap of all candidates, nats.
-    pub stage_gap_pool: Option<f64>,
-    /// Share of chosen queries in one true stage, where the task knows it.
-    pub same_stage_chosen: Option<f64>,
+/// Method and setting, and whether it is of the chosen pairs.
+type Group = (String, String, bool);
+
+/// The curve of each seed of a group.
+type Seeds = Vec<(u64, Curve)>;
+
+/// Curves of each group by task.
+struct Plan {
+    groups: Vec<Group>,
+    tasks: Vec<(String, Vec<Seeds>)>,
 }
 
-type Column = fn(&SessionRow) -> Option<f64>;
+impl Plan {
+    fn of(request: &Request) -> Result<Self, FigureError> {
+        let rows: Vec<Row> = read_rows(&ENTRY, request.sources)?;
+        let mut points: BTreeMap<(String, Group), BTreeMap<u64, Curve>> = BTreeMap::new();
+        let (mut tasks, mut groups) = (Vec::new(), Vec::new());
+        for Row { key, content } in rows {
+            let Content::Session(session) = content else {
+                continue;
+            };
+            let (Some(chosen), Some(pool)) = (session.stage_gap_chosen, session.stage_gap_pool)
+            else {
+                continue;
+            };
+            if session.session == 0 {
+                continue; // random, before anything is known of stages
+            }
+            let setting = shown_setting(&key);
+            for (is_chosen, gap) in [(true, chosen), (false, pool)] {
+                let group = (key.method.clone(), setting.clone(), is_chosen);
+                groups.push(group.clone());
+                let curves = points.entry((key.task.clone(), group)).or_default();
+                let curve = curves.entry(key.seed).or_default();
+                curve.push((session.step as f64, gap));
+            }
+            tasks.push(key.task);
+        }
+        let groups = in_order_of_appearance(groups);
+        let tasks = in_order_of_appearance(tasks).into_iter().map(|task| {
+            let curves = groups.iter().map(|group| {
+                let seeds = points
+                    .remove(&(task.clone(), group.clone()))
+                    .unwrap_or_default();
+                seeds.into_iter().collect()
+            });
+            let curves = curves.collect();
+            (task, curves)
+        });
+        let tasks: Vec<_> = tasks.collect();
+        if tasks.is_empty() {
+            return Err(FigureError::NoRows {
+                figure: ENTRY.name,
+                input: ENTRY.input,
+            });
+        }
+        Ok(Self { groups, tasks })
+    }
+}
+
+fn shown_setting(key: &RunKey) -> String {
+    let teacher = if key.teacher == "oracle" {
+        ""
+    } else {
+        &key.teacher
+    };
+    let parts = [key.setting.as_str(), teacher];
+    let parts: Vec<&str> = parts.into_iter().filter(|part| !part.is_empty()).collect();
+    parts.join(", ")
+}
 
 fn make(request: &Request) -> Result<String, FigureError> {
-    chart(request)?.draw()
-}
-
-fn list(request: &Request) -> Result<String, FigureError> {
-    chart(request)?.csv()
-}
-
-fn chart(request: &Request) -> Result<Chart, FigureError> {
-    let gap: (&str, Column) = ("Stage gap of chosen (nats)", |row| row.stage_gap_chosen);
-    let ratio: (&str, Column) = ("Stage gap, chosen in % of pool", |row| {
-        let pool = row.stage_gap_pool.filter(|pool| *pool > 0.0)?;
-        Some(100.0 * row.stage_gap_chosen? / pool)
-    });
-    let same: (&str, Column) = ("Chosen in one true stage (%)", |row| {
-        Some(100.0 * row.same_stage_chosen?)
-    });
-    let known = [
-        ("stage_gap_chosen", gap),
-        ("stage_gap_ratio", ratio),
-        ("same_stage_chosen", same),
-    ];
-    let (title, column) = choose("y", request.y, &known)?;
-    let rows: Vec<SessionRow> = read_rows(&ENTRY, request.sources)?;
-    let point = |row: SessionRow| {
-        Some(Point {
-            at: (row.step as f64, column(&row)?),
-            task: row.task,
-            method: row.method,
-            setting: row.setting,
-            seed: row.seed,
-            step: row.step,
-        })
-    };
-    let points: Vec<Point> = rows.into_iter().filter_map(point).collect();
-    if points.is_empty() {
-        return Err(FigureError::Misfit(format!(
-            "no session has a value of {}",
-            request.y.unwrap_or("stage_gap_chosen")
-        )));
-    }
-    Ok(Chart {
-        points,
-        x: "Environment steps",
-        y: title,
-        is_rate: request.y == Some("same_stage_chosen"),
-        center: make_center(request.center)?,
-    })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::figure::Source;
-
-    fn draw(y: Option<&str>) -> Result<String, FigureError> {
-        let row = |method: &str, session: u32, gap: Option<f64>| {
-            let row = SessionRow {
-                task: "go-fetch-return".into(),
-                method: method.into(),
-                seed: 1,
-                setting: String::new(),
-                session,
-                step: 1_000 * u64::from(session),
-                stage_gap_chosen: gap,
-                stage_gap_pool: gap.map(|g| 2.0 * g),
-                same_stage_chosen: None,
+    let plan = Plan::of(request)?;
+    let key = plan
+        .groups
+        .iter()
+        .enumerate()
+        .map(|(n, (method, setting, is_chosen))| {
+            let what = if *is_chosen { "chosen" } else { "candidates" };
+            let setting = if setting.is_empty() {
+                String::new()
+            } else {
+                format!(", {setting}")
             };
-            serde_json::to_string(&row).unwrap() + "\n"
+            Entry {
+                look: series(n),
+                name: format!("{}{setting}, {what}", shown_method(method)),
+                has_line: true,
+            }
+        });
+    let size = if plan.tasks.len() == 1 {
+        (440.0, 250.0)
+    } else {
+        (270.0, 180.0)
+    };
+    let sheet = Sheet::new(plan.tasks.len(), 3, size, key.collect()).noted(BAND);
+    let mut svg = sheet.start();
+    for (n, (task, groups)) in plan.tasks.iter().enumerate() {
+        let curves: Vec<Vec<Curve>> = groups
+            .iter()
+            .map(|seeds| seeds.iter().map(|(_, curve)| curve.clone()).collect())
+            .collect();
+        let points = || curves.iter().flatten().flatten();
+        let panel = Panel {
+            frame: sheet.frame(n),
+            x: Scale::exact(
+                0.0,
+                points().fold(0.0, |greatest: f64, p| greatest.max(p.0)),
+            ),
+            y: Scale::around(points().map(|p| p.1).chain([0.0]), 5),
         };
-        let text =
-            row("stair", 0, Some(0.0)) + &row("stair", 1, Some(3.0)) + &row("pebble", 1, None);
-        let sources = [Source {
-            name: "rows.jsonl".into(),
-            text,
-        }];
-        let request = Request {
-            sources: &sources,
-            y,
-            ..Request::default()
+        let labels = Labels {
+            title: task,
+            x: "Environment steps",
+            y: "Stage gap (nats)",
         };
-        (ENTRY.list.unwrap())(&request)
+        panel.draw_axes(&mut svg, labels);
+        draw_seeds(&mut svg, &panel, &curves, interquartile_mean);
     }
+    Ok(svg.finish("Stage gap of chosen pairs and of all candidates over environment steps"))
+}
 
-    #[test]
-    fn sessions_without_a_value_are_left_out() {
-        let header = "task,method,setting,line,x,y\n";
-        let ratio = draw(Some("stage_gap_ratio")).unwrap();
-        let expected =
-            "go-fetch-return,stair,,seed 1,1000,50\ngo-fetch-return,stair,,mean,1000,50\n";
-        assert_eq!(ratio, format!("{header}{expected}"));
-        assert!(draw(None).unwrap().contains("seed 1,0,0"));
-        let told = draw(Some("same_stage_chosen")).unwrap_err().to_string();
-        assert!(told.contains("no session"), "{told}");
+/// Every point of the figure as CSV.
+///
+/// # Errors
+/// As for drawing it.
+pub fn points(request: &Request) -> Result<String, FigureError> {
+    let plan = Plan::of(request)?;
+    let mut csv = String::from("task,method,setting,pairs,line,x,y\n");
+    for (task, groups) in &plan.tasks {
+        for ((method, setting, is_chosen), seeds) in plan.groups.iter().zip(groups) {
+            let pairs = if *is_chosen { "chosen" } else { "candidates" };
+            let named =
+                |line: String| format!("{task},{method},{},{pairs},{line}", quoted(setting));
+            for (seed, curve) in seeds {
+                add_line(&mut csv, &named(format!("seed {seed}")), curve);
+            }
+            let curves: Vec<Curve> = seeds.iter().map(|(_, curve)| curve.clone()).collect();
+            for (line, curve) in drawn_lines(&curves, interquartile_mean) {
+                add_line(&mut csv, &named(line.to_owned()), &curve);
+            }
+        }
     }
+    Ok(csv)
 }

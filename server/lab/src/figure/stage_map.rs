@@ -11,7 +11,6 @@ pub(super) const ENTRY: FigureEntry = FigureEntry {
     input: "a list of probabilities a step, one for each stage; a file is a trajectory",
     choices: &[],
     make,
-    list: None,
 };
 
 /// Shades from paper to full, dark where likely.

@@ -1,75 +1,74 @@
-//! `stair experiment check`: whether a file is right, and what it would cost.
+//! `stair experiment check` and `list`: which runs a file stands for, and what they cost.
 
-use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
-use lab::grid::{self, PlannedRun};
+use lab::config::find_task;
+use lab::cost::{core_time_here, on_cores};
+use lab::experiment::grid::{self, Grid, GridRun, SHIPPED};
 
-use super::folder::read_plan;
+use super::{Chosen, in_words};
 
-/// Check an experiment's file: its runs, and about how long they take here
+/// The machine for which costs are told.
+const CORES: usize = 2;
+
+/// List the runs of a grid with what they cost, and run none
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
-    /// The experiment's file
-    file: PathBuf,
-    /// Its small variant
+    /// A TOML file, or the name of one that comes with the program
+    file: String,
+    /// The small variant: the same figure from few runs
     #[arg(long)]
     small: bool,
-    /// List every run
-    #[arg(long)]
-    list: bool,
 }
 
+/// List the grids that come with the program, with what each costs on two cores like these
+#[derive(Debug, clap::Args)]
+pub(super) struct ListArgs {}
+
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
-    let (file, plan) = read_plan(&args.file, args.small)?;
-    println!("{}\n{}", file.title, file.summary);
-    if args.list {
-        for run in &plan {
-            println!("  {}", run.name);
-        }
+    let chosen = Chosen::open(&args.file, args.small)?;
+    println!("{}\n{}\n", chosen.grid.title, chosen.grid.about);
+    for run in &chosen.grid.runs {
+        println!(
+            "{:60} {:>9} steps  {:>6} answers  {:>9}",
+            run.key.name(),
+            run.config.training.total_steps,
+            run.config.feedback.budget,
+            in_words(time(run))
+        );
     }
-    println!("{}", cost(&plan));
+    println!("\n{}", cost(&chosen.grid));
     Ok(ExitCode::SUCCESS)
 }
 
-/// "12 runs, about 25 minutes on 2 cores of this machine".
-pub(super) fn cost(plan: &[PlannedRun]) -> String {
-    let n_cores = std::thread::available_parallelism().map_or(1, usize::from);
-    let time = shown(grid::time_here(plan, n_cores.min(plan.len())));
-    let runs = if plan.len() == 1 { "run" } else { "runs" };
+pub(super) fn list() -> ExitCode {
+    for shipped in SHIPPED {
+        let resolved = |is_small| grid::resolve(shipped.source(), is_small);
+        let (Ok(whole), Ok(small)) = (resolved(false), resolved(true)) else {
+            continue; // a test resolves them all
+        };
+        println!("{}: {}", shipped.name, whole.title);
+        println!("  {}", whole.about.replace('\n', "\n  "));
+        println!("  {}", cost(&whole));
+        println!("  --small: {}\n", cost(&small));
+    }
+    ExitCode::SUCCESS
+}
+
+/// `12 runs, about 3 h on 2 cores like this machine's`
+fn cost(grid: &Grid) -> String {
+    let whole = on_cores(grid.runs.iter().map(time), CORES);
     format!(
-        "{} {runs}, about {time} on {n_cores} cores of this machine",
-        plan.len()
+        "{} runs, about {} on {CORES} cores like this machine's",
+        grid.runs.len(),
+        in_words(whole)
     )
 }
 
-/// "25 minutes", "3 hours", "4 days".
-pub(super) fn shown(time: Duration) -> String {
-    let minutes = time.as_secs_f64() / 60.0;
-    let (number, unit) = match minutes {
-        m if m < 90.0 => (m.max(1.0), "minute"),
-        m if m < 48.0 * 60.0 => (m / 60.0, "hour"),
-        m => (m / (24.0 * 60.0), "day"),
-    };
-    let number = format!("{number:.0}");
-    let plural = if number == "1" { "" } else { "s" };
-    format!("{number} {unit}{plural}")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn durations_are_told_in_their_unit() {
-        for (seconds, expected) in [
-            (1, "1 minute"),
-            (25 * 60, "25 minutes"),
-            (3 * 3600, "3 hours"),
-            (4 * 86_400, "4 days"),
-        ] {
-            assert_eq!(shown(Duration::from_secs(seconds)), expected);
-        }
-    }
+/// About how long a run takes on a core of its own.
+pub(super) fn time(run: &GridRun) -> Duration {
+    find_task(&run.config.task).map_or(Duration::ZERO, |task| {
+        core_time_here(&run.config, &(task.spec)())
+    })
 }

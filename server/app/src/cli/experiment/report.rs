@@ -1,61 +1,60 @@
-//! `stair experiment report`: figures and tables of an experiment's results.
+//! `stair experiment report`: curves, tables and differences from rows.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use lab::grid::FileText;
-use lab::report::{Report, ReportSettings};
+use lab::experiment::report::{self, RowFile};
 
-use super::folder::{ExperimentFolder, read};
+use super::write_with_picture;
 use crate::cli::BadInput;
-use crate::cli::figure::{Format, encode, write};
 
-/// Curves, stage gaps and tables of an experiment's results, as SVG, PNG, CSV and Markdown
+/// Report what a grid came to: curves, tables, differences between methods
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  stair experiment report data/experiments/go-fetch-return
+  stair experiment report mine/results.jsonl theirs/results.jsonl --out compared")]
 pub(super) struct Args {
-    /// The experiment's folder
-    folder: PathBuf,
-    /// Where to write it [default: `report` in the folder]
+    /// Experiments' folders, or their files of rows
+    #[arg(required = true, value_name = "DIR|FILE")]
+    rows: Vec<PathBuf>,
+    /// Folder for the report [default: report, beside the first file of rows]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Put results of several revisions beside one another
+    /// Compare although rows are of different revisions of the program
     #[arg(long)]
-    mix_revisions: bool,
-    /// Report although some methods lack runs that others have
-    #[arg(long)]
-    partial: bool,
+    mixed: bool,
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
-    let folder = ExperimentFolder::at(&args.folder);
-    let path = folder.file();
-    let name = path.display().to_string();
-    let text = read(&path)?;
-    let file = FileText {
-        name: &name,
-        text: &text,
+    let files = args
+        .rows
+        .iter()
+        .map(|path| read(path))
+        .collect::<Result<Vec<_>, _>>()?;
+    let artifacts = report::make(&files, args.mixed).map_err(BadInput::from_error)?;
+    let beside = || {
+        let first = file_of(&args.rows[0]);
+        first.parent().unwrap_or(Path::new("")).join("report")
     };
-    let file = file.parse().map_err(BadInput::from_error)?;
-    let settings = ReportSettings {
-        x: file.x,
-        may_mix_revisions: args.mix_revisions,
-        may_be_partial: args.partial,
-    };
-    let report = Report::new(folder.results()?, settings).map_err(BadInput::from_error)?;
-    let out = args
-        .out
-        .clone()
-        .unwrap_or_else(|| args.folder.join("report"));
-    for file in report.files(&file.title).map_err(BadInput::from_error)? {
-        let path = out.join(file.name);
-        write(&path, file.text.as_bytes())?;
-        if Format::of(&path).ok() == Some(Format::Svg) {
-            let picture = path.with_extension("png");
-            write(&picture, &encode(file.text, Format::Png, 2.0)?)?;
-        } else if file.name == "report.md" {
-            println!("{}", file.text);
-        }
+    let out = args.out.clone().unwrap_or_else(beside);
+    for artifact in artifacts {
+        write_with_picture(&out.join(artifact.name), artifact.text)?;
     }
-    println!("Written to {}", out.display());
     Ok(ExitCode::SUCCESS)
+}
+
+fn file_of(path: &Path) -> PathBuf {
+    if path.is_dir() {
+        path.join("results.jsonl")
+    } else {
+        path.to_owned()
+    }
+}
+
+fn read(path: &Path) -> Result<RowFile, BadInput> {
+    let path = file_of(path);
+    let name = path.display().to_string();
+    let text = std::fs::read_to_string(&path)
+        .map_err(|error| BadInput(format!("cannot read {name}: {error}")))?;
+    Ok(RowFile { name, text })
 }

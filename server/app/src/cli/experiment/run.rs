@@ -1,208 +1,123 @@
-//! `stair experiment run`: every run of a grid, several at once, each in a process of its own.
-//!
-//! Processes, because a run that dies takes nothing with it, gives all its memory back, and can
-//! be told to stop at a checkpoint. A run keeps one core busy and a second one now and then, so
-//! as many run at once as there are cores.
+//! `stair experiment run`: every run of a grid that is not there yet, several at once.
 
-use std::fs::File;
 use std::num::NonZeroUsize;
-use std::path::{Path, PathBuf};
-use std::process::{Child, Command, ExitCode, Stdio};
-use std::sync::mpsc::{Receiver, channel};
-use std::time::Duration;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
-use lab::grid::{Ended, PlannedRun};
+use lab::experiment::results::{GridFolder, Provenance};
 
-use super::check::cost;
-use super::folder::{ExperimentFolder, Standing, read, read_plan, steps_taken};
-use super::progress::Progress;
-use crate::cli::figure::write;
-use crate::cli::train::stop_on_interrupt;
+use super::pool::{Pool, Tally};
+use super::{Chosen, processors};
+use crate::cli::BadInput;
+use crate::cli::interrupt::on_interrupt;
 
-/// How often running processes are looked at.
-const LOOK: Duration = Duration::from_millis(300);
+/// How long to wait for runs of an earlier start to leave their checkpoints.
+const PATIENCE: Duration = Duration::from_mins(1);
 
-/// Run every run of an experiment's file; finished ones are kept, started ones go on
+/// Run a grid: whatever is finished is kept, whatever was started goes on
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
-  stair experiment run assets/experiments/go-fetch-return.toml --small
-  stair experiment run my.toml --jobs 1 --out results/mine")]
+  stair experiment run go-fetch-return --small
+  stair experiment run my-grid.toml --jobs 8 --out results/my-grid
+
+Ctrl-C leaves checkpoints; the same command goes on. A run that fails is marked with its reason,
+does not stop the others, and is tried again at the next start.")]
 pub(super) struct Args {
-    /// The experiment's file
-    file: PathBuf,
-    /// Its small variant: the same figure from few runs
+    /// A TOML file, or the name of one that comes with the program
+    file: String,
+    /// The small variant: the same figure from few runs
     #[arg(long)]
     small: bool,
     /// Runs at once [default: one for each processor]
     #[arg(long)]
     jobs: Option<NonZeroUsize>,
-    /// The experiment's folder [default: data/experiments/NAME, or NAME-small]
+    /// The experiment's folder [default: data/experiments/NAME]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Keep results of other revisions of this program
+    /// Go on although finished runs are of another revision of the program
     #[arg(long)]
-    mix_revisions: bool,
-}
-
-/// A run under way.
-struct Job {
-    index: usize,
-    child: Child,
+    mixed: bool,
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
-    let (file, plan) = read_plan(&args.file, args.small)?;
-    let folder = ExperimentFolder::at(&args.out.clone().unwrap_or_else(|| default_out(args)));
-    let standings = plan
-        .iter()
-        .map(|run| folder.standing(run, args.mix_revisions))
-        .collect::<anyhow::Result<Vec<_>>>()?;
-    folder.claim(&read(&args.file)?)?;
-    let waiting: Vec<usize> = (0..plan.len())
-        .filter(|&i| !matches!(standings[i], Standing::Finished))
-        .collect();
-    println!("{}: {}", file.title, cost(&plan));
-    if waiting.is_empty() {
-        println!("all of them are finished already: nothing to do");
-        return Ok(success(&folder));
-    }
-    if waiting.len() < plan.len() {
-        println!("{} are finished already", plan.len() - waiting.len());
-    }
-    let done = plan.iter().zip(&standings).map(|(run, standing)| {
-        let steps = || steps_taken(&folder.run_folder(run)) as f64;
-        match standing {
-            Standing::Finished => 1.0,
-            Standing::Started => steps() / run.config.training.total_steps as f64,
-            Standing::New => 0.0,
-        }
-    });
-    let mut progress = Progress::new(&plan, done.collect());
-    let (sender, interrupt) = channel();
-    stop_on_interrupt(sender)?;
-    let n_jobs = args
-        .jobs
-        .unwrap_or_else(|| std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN));
-    let (failed, is_stopped) = work(&folder, &plan, waiting, n_jobs, &interrupt, &mut progress)?;
-    progress.clear();
-    if is_stopped {
-        eprintln!("Stopped; every run is at a checkpoint. The same command goes on with them.");
-        return Ok(ExitCode::from(130));
-    }
-    if failed.is_empty() {
-        return Ok(success(&folder));
-    }
-    eprintln!("{} of {} runs failed:", failed.len(), plan.len());
-    for (name, reason) in &failed {
-        eprintln!("  {name}: {reason}");
-    }
-    eprintln!("The same command tries them again.");
-    Ok(ExitCode::FAILURE)
+    let chosen = Chosen::open(&args.file, args.small)?;
+    let named = || PathBuf::from("data/experiments").join(&chosen.stem);
+    let out = args.out.clone().unwrap_or_else(named);
+    let folder = GridFolder::at(&out);
+    let provenance = Provenance {
+        revision: env!("STAIR_REVISION").into(),
+        machine: machine(),
+    };
+    let revision = (!args.mixed).then_some(provenance.revision.as_str());
+    let results = folder.results().map_err(BadInput::from_error)?;
+    folder
+        .check(&chosen.grid.runs, &results, revision)
+        .map_err(BadInput::from_error)?;
+    folder.create(&chosen.text)?;
+    let log = folder.log_file()?;
+    hold(&log, &out)?;
+
+    let is_told = Arc::new(AtomicBool::new(false));
+    let hears = Arc::clone(&is_told);
+    on_interrupt(move || hears.store(true, Ordering::SeqCst))?;
+    let jobs = args.jobs.unwrap_or_else(processors).get();
+    let results = folder.results().map_err(BadInput::from_error)?; // another start may have added some
+    let pool = Pool::new(&folder, log, provenance, jobs);
+    let tally = pool.work(&chosen.grid.runs, &results, &is_told)?;
+    Ok(tell(&tally, &out))
 }
 
-fn default_out(args: &Args) -> PathBuf {
-    let stem = args.file.file_stem().unwrap_or_default().to_string_lossy();
-    let suffix = if args.small { "-small" } else { "" };
-    PathBuf::from(format!("data/experiments/{stem}{suffix}"))
-}
-
-fn success(folder: &ExperimentFolder) -> ExitCode {
-    let folder = folder.root().display();
-    println!("Look at it: stair experiment report {folder}");
-    ExitCode::SUCCESS
-}
-
-/// Name and reason of each run that failed.
-type Failures = Vec<(String, String)>;
-
-/// Works through the waiting runs; returns what failed, and whether it was told to stop.
-fn work(
-    folder: &ExperimentFolder,
-    plan: &[PlannedRun],
-    waiting: Vec<usize>,
-    n_jobs: NonZeroUsize,
-    interrupt: &Receiver<lab::message::Command>,
-    progress: &mut Progress,
-) -> anyhow::Result<(Failures, bool)> {
-    let mut waiting = waiting.into_iter();
-    let mut jobs: Vec<Job> = Vec::new();
-    let mut failed = Vec::new();
-    let mut is_stopped = false;
-    loop {
-        while jobs.len() < n_jobs.get() && !is_stopped {
-            let Some(index) = waiting.next() else { break };
-            let child = start(folder, &plan[index])?;
-            progress.begin(index, &plan[index]);
-            jobs.push(Job { index, child });
+/// Nobody else works in the folder, not even a run that an earlier start left behind.
+fn hold(log: &std::fs::File, out: &std::path::Path) -> anyhow::Result<()> {
+    let began = Instant::now();
+    while let Err(error) = log.try_lock() {
+        if let std::fs::TryLockError::Error(error) = error {
+            return Err(error).with_context(|| format!("cannot lock {}", out.display()));
         }
-        if jobs.is_empty() {
-            return Ok((failed, is_stopped));
+        if began.elapsed() > PATIENCE {
+            let told = format!(
+                "{} is in use by another start of the experiment",
+                out.display()
+            );
+            return Err(BadInput(told).into());
         }
-        if interrupt.recv_timeout(LOOK).is_ok() {
-            is_stopped = true;
-            for job in &mut jobs {
-                drop(job.child.stdin.take()); // its end is what they wait for
-            }
-        }
-        let mut running = Vec::new();
-        for mut job in jobs {
-            let run = &plan[job.index];
-            match job.child.try_wait().context("cannot wait for a run")? {
-                None => {
-                    progress.advance(job.index, steps_taken(&folder.run_folder(run)));
-                    running.push(job);
-                }
-                Some(_) if is_stopped => {}
-                Some(status) => {
-                    let reason = format!("{}: {status}", last_line(&folder.log(run)));
-                    let result = folder.keep(run, &reason)?;
-                    let success = result.evaluations.last().map_or(0.0, |e| e.success_rate);
-                    let words = match &result.row.ended {
-                        Ended::Finished { .. } => format!("{}: success {success:.2}", run.name),
-                        Ended::Failed { reason } => {
-                            failed.push((run.name.clone(), reason.clone()));
-                            format!("{}: failed: {reason}", run.name)
-                        }
-                    };
-                    progress.end(job.index, &words);
-                }
-            }
-        }
-        jobs = running;
+        std::thread::sleep(Duration::from_millis(100)); // the lock's holder says nothing when it goes
     }
+    Ok(())
 }
 
-/// Starts or resumes a run; it stops at a checkpoint when its standard input ends, so also when
-/// this process dies.
-fn start(folder: &ExperimentFolder, run: &PlannedRun) -> anyhow::Result<Child> {
-    let settings = folder.settings(run);
-    write(&settings, run.config.to_toml().as_bytes())?;
-    let log = folder.log(run);
-    write(&log, b"")?;
-    let log = File::create(&log).with_context(|| format!("cannot write {}", log.display()))?;
-    let errors = log.try_clone().context("cannot write a run's log")?;
-    let mut command = Command::new(std::env::current_exe().context("cannot find this program")?);
-    command.arg("train");
-    let run_folder = folder.run_folder(run);
-    if lab::run::Run::exists(&run_folder) {
-        command.arg("--resume").arg(&run_folder);
+fn tell(tally: &Tally, out: &std::path::Path) -> ExitCode {
+    println!(
+        "{} of {} runs are finished, {} of them before this start.",
+        tally.n_finished + tally.n_before,
+        tally.n_runs,
+        tally.n_before
+    );
+    for (name, reason) in &tally.failed {
+        println!("Failed: {name}: {reason}");
+    }
+    if tally.n_finished + tally.n_before + tally.failed.len() < tally.n_runs {
+        println!("Stopped. The same command goes on.");
     } else {
-        command.arg("--config").arg(&settings);
-        command.arg("--out").arg(&run_folder);
+        println!("Report: stair experiment report {}", out.display());
     }
-    command.args(["--teacher", &run.teacher, "--json", "--stop-at-eof"]);
-    command.stdin(Stdio::piped()).stdout(log).stderr(errors);
-    // Ctrl-C in a terminal reaches a whole process group; runs are told to stop by us alone
-    std::os::unix::process::CommandExt::process_group(&mut command, 0);
-    command
-        .spawn()
-        .with_context(|| format!("cannot start the run {}", run.name))
+    ExitCode::from(u8::from(!tally.failed.is_empty()))
 }
 
-fn last_line(path: &Path) -> String {
-    let text = std::fs::read_to_string(path).unwrap_or_default();
-    let line = text.lines().rev().find(|line| !line.trim().is_empty());
-    let line = line.unwrap_or("it said nothing");
-    line.strip_prefix("stair: ").unwrap_or(line).to_owned()
+/// `AMD EPYC 9R45, 2 cores`
+fn machine() -> String {
+    let cpus = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let model = cpus.lines().find(|line| line.starts_with("model name"));
+    let model = model
+        .and_then(|line| line.split_once(": "))
+        .map(|(_, name)| name.trim());
+    format!(
+        "{}, {} cores",
+        model.unwrap_or("unknown processor"),
+        processors()
+    )
 }

@@ -16,8 +16,6 @@ pub(in crate::cli) enum Format {
     Svg,
     /// Pixels.
     Png,
-    /// Every drawn point, where the figure can be listed.
-    Csv,
 }
 
 impl Format {
@@ -29,21 +27,20 @@ impl Format {
         match path.extension().and_then(|ending| ending.to_str()) {
             Some("svg") => Ok(Self::Svg),
             Some("png") => Ok(Self::Png),
-            Some("csv") => Ok(Self::Csv),
             _ => Err(BadInput(format!(
-                "{} must end in .svg, .png or .csv",
+                "{} must end in .svg or .png",
                 path.display()
             ))),
         }
     }
 }
 
-/// The bytes of the file, from its text. A PNG has `scale` pixels for each unit of the figure.
+/// The bytes of the file. A PNG has `scale` pixels for each unit of the figure.
 ///
 /// # Errors
 /// When the figure is larger than a picture can be.
 pub(in crate::cli) fn encode(svg: String, format: Format, scale: f32) -> anyhow::Result<Vec<u8>> {
-    if format != Format::Png {
+    if format == Format::Svg {
         return Ok(svg.into_bytes());
     }
     let options = usvg::Options {

@@ -1,0 +1,188 @@
+//! Results of experiments, as pages show them: those below the data folder, which may still grow,
+//! and those that come with the program.
+//!
+//! Invariants: reads only; a report is made once for the same rows.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use lab::experiment::Artifact;
+use lab::experiment::grid::{GridText, resolve};
+use lab::experiment::report::{self, RowFile};
+use lab::experiment::results::{GridFolder, Results};
+use serde::Deserialize;
+
+/// `(name, experiment.toml, results.jsonl)`
+const SHIPPED: &[(&str, &str, &str)] = include!(concat!(env!("OUT_DIR"), "/results.rs"));
+
+/// An experiment with its rows.
+#[derive(Debug, Clone)]
+pub struct Experiment {
+    /// Of its folder.
+    pub name: String,
+    /// What it shows, in a few words.
+    pub title: String,
+    /// What it shows, in sentences.
+    pub about: String,
+    /// JSON Lines.
+    pub rows: String,
+    /// Where it is, while it runs.
+    pub progress: Option<Progress>,
+    /// Whether it came with the program.
+    pub is_shipped: bool,
+}
+
+/// What `stair experiment run` says about itself.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct Progress {
+    /// In the grid.
+    pub n_runs: usize,
+    /// Finished or failed.
+    pub n_over: usize,
+    /// Under way.
+    pub running: Vec<Running>,
+    /// Seconds, about.
+    pub left_s: f64,
+    /// Whether somebody works on it now.
+    #[serde(skip)]
+    pub is_up: bool,
+}
+
+/// A run under way.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct Running {
+    /// Its name.
+    pub name: String,
+    /// Environment steps taken.
+    pub step: u64,
+    /// Environment steps in all.
+    pub total_steps: u64,
+}
+
+/// Every experiment: of the data folder, then of the program.
+pub fn all(data: &Path) -> Vec<Experiment> {
+    let entries = std::fs::read_dir(data.join("experiments"));
+    let entries = entries.into_iter().flatten().flatten();
+    let mut names: Vec<String> = entries
+        .filter(|entry| entry.path().is_dir())
+        .map(|entry| entry.file_name().to_string_lossy().into_owned())
+        .collect();
+    names.sort();
+    let own = names.iter().map(|name| open(data, name));
+    let shipped = SHIPPED
+        .iter()
+        .filter(|(name, _, _)| !names.iter().any(|own| own == name))
+        .map(|(name, grid, rows)| Experiment {
+            is_shipped: true,
+            ..described(name, grid, (*rows).to_owned(), None)
+        });
+    own.chain(shipped).collect()
+}
+
+/// The experiment of that name.
+pub fn find(data: &Path, name: &str) -> Option<Experiment> {
+    all(data)
+        .into_iter()
+        .find(|experiment| experiment.name == name)
+}
+
+fn open(data: &Path, name: &str) -> Experiment {
+    let root = data.join("experiments").join(name);
+    let text = |file: &str| std::fs::read_to_string(root.join(file)).unwrap_or_default();
+    let progress = serde_json::from_str::<Progress>(&text("progress.json")).ok();
+    let progress = progress.map(|progress| Progress {
+        is_up: is_held(&root),
+        ..progress
+    });
+    described(
+        name,
+        &text("experiment.toml"),
+        text("results.jsonl"),
+        progress,
+    )
+}
+
+/// Whether a start of the experiment, or a run of it, is up.
+fn is_held(root: &Path) -> bool {
+    if !root.join("log.jsonl").exists() {
+        return false;
+    }
+    let log = GridFolder::at(root).log_file();
+    log.is_ok_and(|log| matches!(log.try_lock(), Err(std::fs::TryLockError::WouldBlock)))
+}
+
+fn described(name: &str, grid: &str, rows: String, progress: Option<Progress>) -> Experiment {
+    let grid = resolve(GridText { name, text: grid }, false);
+    let (title, about) = grid.map_or_else(
+        |_| (name.to_owned(), String::new()),
+        |grid| (grid.title, grid.about),
+    );
+    Experiment {
+        name: name.to_owned(),
+        title,
+        about,
+        rows,
+        progress,
+        is_shipped: false,
+    }
+}
+
+impl Experiment {
+    /// Runs that are over.
+    pub fn n_finished(&self) -> usize {
+        Results::parse(&self.name, &self.rows).map_or(0, |results| results.runs.len())
+    }
+
+    /// The report; empty before the first run is over. Made anew when there are new rows.
+    ///
+    /// # Errors
+    /// What is wrong with the rows, for the person who looks at them.
+    pub fn report(&self) -> Result<Arc<Vec<Artifact>>, String> {
+        type Made = (String, Arc<Vec<Artifact>>);
+        static MADE: Mutex<BTreeMap<String, Made>> = Mutex::new(BTreeMap::new());
+        if self.n_finished() == 0 {
+            return Ok(Arc::default());
+        }
+        let mut made = MADE.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((rows, report)) = made.get(&self.name)
+            && *rows == self.rows
+        {
+            return Ok(Arc::clone(report));
+        }
+        let file = RowFile {
+            name: self.name.clone(),
+            text: self.rows.clone(),
+        };
+        let report = Arc::new(report::make(&[file], true).map_err(|error| error.to_string())?);
+        made.insert(self.name.clone(), (self.rows.clone(), Arc::clone(&report)));
+        Ok(report)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_comes_with_the_program_can_be_reported() {
+        for (name, grid, rows) in SHIPPED {
+            let experiment = described(name, grid, (*rows).to_owned(), None);
+            assert_ne!(experiment.title, *name, "experiment.toml of {name}");
+            let report = experiment
+                .report()
+                .unwrap_or_else(|error| panic!("{name}: {error}"));
+            assert!(!report.is_empty(), "{name}");
+        }
+    }
+
+    #[test]
+    fn a_folder_without_rows_is_there_and_says_nothing() {
+        let data = tempfile::tempdir().unwrap();
+        std::fs::create_dir_all(data.path().join("experiments/mine")).unwrap();
+        let mine = find(data.path(), "mine").unwrap();
+        assert_eq!((mine.n_finished(), mine.progress.clone()), (0, None));
+        assert!(mine.report().unwrap().is_empty());
+        assert!(find(data.path(), "..").is_none());
+    }
+}

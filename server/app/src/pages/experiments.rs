@@ -1,0 +1,73 @@
+//! `/experiments`: every experiment that has results or is under way.
+
+use askama::Template;
+use axum::extract::State;
+use axum::response::Response;
+
+use super::experiment::in_worker;
+use super::{show, thousands};
+use crate::experiments::{self, Experiment};
+use crate::problem::Problem;
+use crate::state::AppState;
+
+#[derive(Template)]
+#[template(path = "experiments.html")]
+struct ExperimentsPage {
+    /// Of the data folder, then of the program.
+    lines: Vec<Line>,
+    has_lines: bool,
+}
+
+/// One experiment.
+struct Line {
+    name: String,
+    title: String,
+    /// `12 of 40 runs, working`
+    state: String,
+    is_up: bool,
+    /// Where it is from.
+    origin: &'static str,
+}
+
+/// `GET /experiments`
+///
+/// # Errors
+/// A worker that cannot be had.
+pub async fn page(State(app): State<AppState>) -> Result<Response, Problem> {
+    let lines = in_worker(move || {
+        experiments::all(app.store.folder())
+            .iter()
+            .map(line)
+            .collect::<Vec<_>>()
+    });
+    let lines = lines.await?;
+    Ok(show(&ExperimentsPage {
+        has_lines: !lines.is_empty(),
+        lines,
+    }))
+}
+
+fn line(experiment: &Experiment) -> Line {
+    let is_up = experiment.progress.as_ref().is_some_and(|p| p.is_up);
+    Line {
+        name: experiment.name.clone(),
+        title: experiment.title.clone(),
+        state: state(experiment),
+        is_up,
+        origin: if experiment.is_shipped {
+            "came with the program"
+        } else {
+            "in the data folder"
+        },
+    }
+}
+
+/// How many runs are over, in words.
+pub(super) fn state(experiment: &Experiment) -> String {
+    let n = thousands(experiment.n_finished() as u64);
+    match &experiment.progress {
+        Some(progress) if progress.is_up => format!("{n} of {} runs, working", progress.n_runs),
+        Some(progress) => format!("{n} of {} runs", progress.n_runs),
+        None => format!("{n} runs"),
+    }
+}

@@ -1,0 +1,279 @@
+//! What a grid came to: curves, tables and differences between methods, from rows alone.
+//!
+//! Pure: the same rows give the same bytes.
+
+use std::collections::BTreeSet;
+
+use super::Artifact;
+use super::grid::RunKey;
+use super::results::{Results, RunResult};
+use crate::config::ConfigError;
+use crate::figure::{self, CurveRow, FigureError, Request, Source};
+
+mod comparable;
+mod score;
+mod table;
+
+pub use score::{Reached, Score, area, reached, score};
+
+/// A file of rows.
+#[derive(Debug, Clone)]
+pub struct RowFile {
+    /// What to call it when something is wrong with it.
+    pub name: String,
+    /// JSON Lines.
+    pub text: String,
+}
+
+/// Why there is no report.
+#[derive(Debug, thiserror::Error)]
+pub enum ReportError {
+    /// A file that is none of rows.
+    #[error(transparent)]
+    Text(#[from] ConfigError),
+    /// A figure that cannot be drawn.
+    #[error(transparent)]
+    Figure(#[from] FigureError),
+    /// Nothing is finished yet.
+    #[error("{0} has no finished run to report")]
+    Nothing(String),
+    /// Files whose runs share no task.
+    #[error(
+        "{first} is of {first_tasks} and {second} of {second_tasks}: runs of different tasks cannot be compared; report them apart"
+    )]
+    OtherTasks {
+        /// A file.
+        first: String,
+        /// Its tasks.
+        first_tasks: String,
+        /// Another file.
+        second: String,
+        /// Its tasks.
+        second_tasks: String,
+    },
+    /// Runs that should differ by their method or seed alone.
+    #[error(
+        "{first} has {what} {there}, but {second} has {here}: they cannot be compared; give them settings with different names, or report them apart"
+    )]
+    OtherTerms {
+        /// A run.
+        first: String,
+        /// Another.
+        second: String,
+        /// In what they differ.
+        what: &'static str,
+        /// Of the first.
+        there: String,
+        /// Of the second.
+        here: String,
+    },
+    /// The same run from two files.
+    #[error("{run} is in {first} and in {second}")]
+    Twice {
+        /// The run.
+        run: String,
+        /// A file.
+        first: String,
+        /// Another file.
+        second: String,
+    },
+    /// Rows of more than one revision.
+    #[error(
+        "the rows are of different revisions: {0}; their numbers may differ for that alone. Allow it with --mixed"
+    )]
+    MixedRevisions(String),
+}
+
+/// Runs of one method in one setting under one teacher on one task.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct Group {
+    task: String,
+    method: String,
+    /// As tables and keys show it; with the teacher where it is not the oracle.
+    setting: String,
+}
+
+/// Runs that may be told together.
+struct Runs {
+    runs: Vec<RunResult>,
+    failed: Vec<(RunKey, String)>,
+}
+
+/// Makes a report of rows.
+///
+/// * `may_mix` – whether rows of different revisions may stand side by side; the report names
+///   them then
+///
+/// # Errors
+/// [`ReportError`] names the runs that cannot be compared, and in what they differ.
+pub fn make(files: &[RowFile], may_mix: bool) -> Result<Vec<Artifact>, ReportError> {
+    let mut read = Vec::with_capacity(files.len());
+    for file in files {
+        read.push((file.name.as_str(), Results::parse(&file.name, &file.text)?));
+    }
+    comparable::check(&read, may_mix)?;
+    let failed = read
+        .iter()
+        .flat_map(|(_, results)| results.failed.clone())
+        .collect();
+    let runs = read
+        .into_iter()
+        .flat_map(|(_, results)| results.runs)
+        .collect();
+    let runs = Runs { runs, failed };
+    let file = |name, text| Artifact { name, text };
+    let mut artifacts = vec![
+        file("report.md", table::markdown(&runs)),
+        file("scores.csv", table::csv(&runs)),
+    ];
+    for kind in [true, false] {
+        let of_kind: Vec<&RunResult> = runs
+            .runs
+            .iter()
+            .filter(|run| run.end.has_success == kind)
+            .collect();
+        if of_kind.is_empty() {
+            continue;
+        }
+        let y = if kind { "success_rate" } else { "return_mean" };
+        let names = if kind {
+            [
+                ("success.svg", "success.csv"),
+                ("success-by-budget.svg", "success-by-budget.csv"),
+            ]
+        } else {
+            [
+                ("return.svg", "return.csv"),
+                ("return-by-budget.svg", "return-by-budget.csv"),
+            ]
+        };
+        artifacts.extend(curves(names[0], &evaluation_rows(&of_kind), y, "step")?);
+        let by_budget = budget_rows(&of_kind);
+        if !by_budget.is_empty() {
+            artifacts.extend(curves(names[1], &by_budget, y, "labels")?);
+        }
+    }
+    artifacts.extend(stage_gaps(files)?);
+    Ok(artifacts)
+}
+
+/// A figure of curves, the interquartile mean over seeds, with all its points.
+fn curves(
+    (svg, csv): (&'static str, &'static str),
+    rows: &[CurveRow],
+    y: &str,
+    x: &str,
+) -> Result<[Artifact; 2], FigureError> {
+    let sources = [Source {
+        name: svg.to_owned(),
+        text: super::json_lines(rows),
+    }];
+    let request = Request {
+        sources: &sources,
+        x: Some(x),
+        y: Some(y),
+        center: Some("iqm"),
+    };
+    let file = |name, text| Artifact { name, text };
+    Ok([
+        file(svg, figure::make(figure::find("curves")?, &request)?),
+        file(csv, figure::curve_points(&request)?),
+    ])
+}
+
+fn evaluation_rows(runs: &[&RunResult]) -> Vec<CurveRow> {
+    let of_run = |run: &&RunResult| {
+        let (key, setting) = (run.key.clone(), shown_setting(&run.key));
+        let rows = run.evaluations.iter().map(move |e| CurveRow {
+            task: key.task.clone(),
+            method: key.method.clone(),
+            seed: key.seed,
+            setting: setting.clone(),
+            step: e.step,
+            labels: e.labels,
+            success_rate: e.success_rate,
+            return_mean: e.return_mean,
+            wall_s: None,
+        });
+        rows.collect::<Vec<_>>()
+    };
+    runs.iter().flat_map(of_run).collect()
+}
+
+/// Each run's score at its budget, of methods that are there with several and for which a budget
+/// says all that tells their settings apart.
+fn budget_rows(runs: &[&RunResult]) -> Vec<CurveRow> {
+    let same = |a: &RunKey, b: &RunKey| {
+        (&a.task, &a.method, &a.teacher) == (&b.task, &b.method, &b.teacher)
+    };
+    let is_one_of_several = |run: &&&RunResult| {
+        let alike = || runs.iter().filter(|other| same(&run.key, &other.key));
+        let budgets: BTreeSet<u32> = alike().map(|other| other.end.budget).collect();
+        let settings: BTreeSet<&str> = alike().map(|other| other.key.setting.as_str()).collect();
+        budgets.len() > 1 && budgets.len() == settings.len()
+    };
+    let row = |run: &&RunResult| CurveRow {
+        task: run.key.task.clone(),
+        method: run.key.method.clone(),
+        seed: run.key.seed,
+        setting: shown_teacher(&run.key).to_owned(),
+        step: u64::from(run.end.budget),
+        labels: run.end.budget,
+        success_rate: score(run).value,
+        return_mean: score(run).value,
+        wall_s: None,
+    };
+    runs.iter().filter(is_one_of_several).map(row).collect()
+}
+
+/// The figure of stage gaps, where any method has them.
+fn stage_gaps(files: &[RowFile]) -> Result<Vec<Artifact>, FigureError> {
+    let sources: Vec<Source> = files
+        .iter()
+        .map(|file| Source {
+            name: file.name.clone(),
+            text: file.text.clone(),
+        })
+        .collect();
+    let request = Request {
+        sources: &sources,
+        ..Request::default()
+    };
+    let file = |name, text| Artifact { name, text };
+    match figure::make(figure::find("stage-gaps")?, &request) {
+        Ok(svg) => Ok(vec![
+            file("stage-gaps.svg", svg),
+            file("stage-gaps.csv", figure::stage_gap_points(&request)?),
+        ]),
+        Err(FigureError::NoRows { .. }) => Ok(Vec::new()),
+        Err(error) => Err(error),
+    }
+}
+
+fn shown_teacher(key: &RunKey) -> &str {
+    if key.teacher == "oracle" {
+        ""
+    } else {
+        &key.teacher
+    }
+}
+
+/// Setting and teacher as one text; empty for the plain setting under the oracle.
+fn shown_setting(key: &RunKey) -> String {
+    let parts = [key.setting.as_str(), shown_teacher(key)];
+    let parts: Vec<&str> = parts.into_iter().filter(|part| !part.is_empty()).collect();
+    parts.join(", ")
+}
+
+impl Group {
+    fn of(key: &RunKey) -> Self {
+        Self {
+            task: key.task.clone(),
+            method: key.method.clone(),
+            setting: shown_setting(key),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

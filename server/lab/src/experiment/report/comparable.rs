@@ -1,0 +1,149 @@
+//! Which runs may stand in one table.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::ReportError;
+use crate::experiment::results::{Results, RunResult};
+
+/// Refuses what must not be compared.
+pub(super) fn check(files: &[(&str, Results)], may_mix: bool) -> Result<(), ReportError> {
+    let names = || {
+        files
+            .iter()
+            .map(|(name, _)| *name)
+            .collect::<Vec<_>>()
+            .join(", ")
+    };
+    if files.iter().all(|(_, results)| results.runs.is_empty()) {
+        return Err(ReportError::Nothing(names()));
+    }
+    tasks(files)?;
+    once(files)?;
+    let runs: Vec<&RunResult> = files
+        .iter()
+        .flat_map(|(_, results)| &results.runs)
+        .collect();
+    for (n, run) in runs.iter().enumerate() {
+        for other in &runs[..n] {
+            terms(other, run)?;
+        }
+    }
+    if may_mix {
+        return Ok(());
+    }
+    let revisions = revisions(runs.iter().copied());
+    if revisions.len() > 1 {
+        return Err(ReportError::MixedRevisions(counted(&revisions)));
+    }
+    Ok(())
+}
+
+/// How many runs are of each revision, and the first of them.
+pub(super) fn revisions<'a>(
+    runs: impl Iterator<Item = &'a RunResult>,
+) -> BTreeMap<&'a str, (usize, String)> {
+    let mut revisions: BTreeMap<&str, (usize, String)> = BTreeMap::new();
+    for run in runs {
+        let counted = revisions.entry(&run.end.revision);
+        counted.or_insert_with(|| (0, run.key.name())).0 += 1;
+    }
+    revisions
+}
+
+/// `6caf6c4 (12 runs, go-fetch-return.stair.oracle.1 first), 0123abc (1 run, …)`
+pub(super) fn counted(revisions: &BTreeMap<&str, (usize, String)>) -> String {
+    let told = revisions.iter().map(|(revision, (n, first))| {
+        let runs = if *n == 1 { "run" } else { "runs" };
+        format!("{revision} ({n} {runs}, {first} first)")
+    });
+    told.collect::<Vec<_>>().join(", ")
+}
+
+/// Every two files have a task in common.
+fn tasks(files: &[(&str, Results)]) -> Result<(), ReportError> {
+    let tasks = |results: &Results| -> BTreeSet<String> {
+        results
+            .runs
+            .iter()
+            .map(|run| run.key.task.clone())
+            .collect()
+    };
+    for (n, (second, results)) in files.iter().enumerate() {
+        for (first, others) in &files[..n] {
+            let (there, here) = (tasks(others), tasks(results));
+            if there.is_empty() || here.is_empty() || !there.is_disjoint(&here) {
+                continue;
+            }
+            let told = |tasks: BTreeSet<String>| tasks.into_iter().collect::<Vec<_>>().join(", ");
+            return Err(ReportError::OtherTasks {
+                first: (*first).to_owned(),
+                first_tasks: told(there),
+                second: (*second).to_owned(),
+                second_tasks: told(here),
+            });
+        }
+    }
+    Ok(())
+}
+
+/// No run is in two files.
+fn once(files: &[(&str, Results)]) -> Result<(), ReportError> {
+    let mut seen = BTreeMap::new();
+    for (file, results) in files {
+        for run in &results.runs {
+            if let Some(first) = seen.insert(&run.key, *file) {
+                return Err(ReportError::Twice {
+                    run: run.key.name(),
+                    first: first.to_owned(),
+                    second: (*file).to_owned(),
+                });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Two runs of one task in one setting were trained as long, on as many answers, and tried alike;
+/// two that differ by their seed alone had the same settings.
+fn terms(first: &RunResult, second: &RunResult) -> Result<(), ReportError> {
+    let (a, b) = (&first.key, &second.key);
+    if (&a.task, &a.setting) != (&b.task, &b.setting) {
+        return Ok(());
+    }
+    let differ = |what, there: &dyn ToString, here: &dyn ToString| {
+        Err(ReportError::OtherTerms {
+            first: a.name(),
+            second: b.name(),
+            what,
+            there: there.to_string(),
+            here: here.to_string(),
+        })
+    };
+    let (x, y) = (&first.end, &second.end);
+    if x.total_steps != y.total_steps {
+        return differ("steps", &x.total_steps, &y.total_steps);
+    }
+    let both_ask = x.budget > 0 && y.budget > 0;
+    if both_ask && x.budget != y.budget {
+        return differ("a budget of answers", &x.budget, &y.budget);
+    }
+    if x.evaluation_episodes != y.evaluation_episodes {
+        return differ(
+            "evaluation episodes",
+            &x.evaluation_episodes,
+            &y.evaluation_episodes,
+        );
+    }
+    if x.evaluation_every != y.evaluation_every {
+        return differ(
+            "steps between evaluations",
+            &x.evaluation_every,
+            &y.evaluation_every,
+        );
+    }
+    let is_of_one_group = (&a.method, &a.teacher) == (&b.method, &b.teacher);
+    if is_of_one_group && x.settings != y.settings {
+        return differ("settings", &x.settings, &y.settings);
+    }
+    Ok(())
+}

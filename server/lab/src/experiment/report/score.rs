@@ -1,0 +1,105 @@
+//! What one run came to, as single numbers.
+
+use domain::agreement::mean;
+
+use crate::experiment::results::{EvaluationRow, RunResult};
+
+/// Evaluations at the end of which the mean is a run's score.
+const N_LAST: usize = 10;
+
+/// How well a run ended.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Score {
+    /// Mean of the last ten evaluations: success in [0, 1], or the task return where a task is
+    /// not solved but done better or worse.
+    pub value: f64,
+    /// Evaluations that it is the mean of; fewer than ten where there were fewer.
+    pub n_evaluations: usize,
+}
+
+/// Steps and labels at the first evaluation that reached something.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Reached {
+    /// Environment steps.
+    pub step: u64,
+    /// Answers.
+    pub labels: u32,
+}
+
+/// The run's score; NaN for a run that was never tried.
+pub fn score(run: &RunResult) -> Score {
+    let from = run.evaluations.len().saturating_sub(N_LAST);
+    let last: Vec<f64> = run.evaluations[from..]
+        .iter()
+        .map(|e| value(run, e))
+        .collect();
+    Score {
+        value: mean(&last),
+        n_evaluations: last.len(),
+    }
+}
+
+/// When success first was at least a share.
+pub fn reached(run: &RunResult, share: f64) -> Option<Reached> {
+    let first = run.evaluations.iter().find(|e| e.success_rate >= share)?;
+    Some(Reached {
+        step: first.step,
+        labels: first.labels,
+    })
+}
+
+/// Mean height of the run's curve, straight lines between evaluations, from the first to the
+/// last: the area under it by its width. That of the one evaluation where there is one.
+pub fn area(run: &RunResult) -> f64 {
+    let points: Vec<(f64, f64)> = run
+        .evaluations
+        .iter()
+        .map(|e| (e.step as f64, value(run, e)))
+        .collect();
+    let (Some(first), Some(last)) = (points.first(), points.last()) else {
+        return f64::NAN;
+    };
+    let width = last.0 - first.0;
+    if width <= 0.0 {
+        return last.1;
+    }
+    let trapezoids = points
+        .windows(2)
+        .map(|pair| (pair[1].0 - pair[0].0) * f64::midpoint(pair[0].1, pair[1].1));
+    trapezoids.sum::<f64>() / width
+}
+
+/// Share of chosen pairs within one true stage, mean over the sessions in which the method chose;
+/// `None` where the task has no stages or the method had no choice.
+pub(super) fn same_stage(run: &RunResult) -> Option<f64> {
+    mean_of(
+        run.sessions
+            .iter()
+            .filter(|s| s.session > 0)
+            .map(|s| s.same_stage_chosen),
+    )
+}
+
+/// Stage gap of chosen pairs by that of all candidates, mean over the same sessions.
+pub(super) fn gap_ratio(run: &RunResult) -> Option<f64> {
+    let chosen = run.sessions.iter().filter(|s| s.session > 0);
+    mean_of(
+        chosen.map(|s| match (s.stage_gap_chosen, s.stage_gap_pool) {
+            (Some(chosen), Some(pool)) if pool > 0.0 => Some(chosen / pool),
+            _ => None,
+        }),
+    )
+}
+
+fn mean_of(values: impl Iterator<Item = Option<f64>>) -> Option<f64> {
+    let values: Vec<f64> = values.flatten().collect();
+    (!values.is_empty()).then(|| mean(&values))
+}
+
+fn value(run: &RunResult, evaluation: &EvaluationRow) -> f64 {
+    if run.end.has_success {
+        evaluation.success_rate
+    } else {
+        evaluation.return_mean
+    }
+}

@@ -1,0 +1,402 @@
+//! The numbers of a report: Markdown for people, CSV for programs.
+
+use domain::agreement::{Bootstrap, Estimate, interquartile_mean};
+
+use super::comparable::{counted, revisions};
+use super::score::{Reached, area, gap_ratio, reached, same_stage, score};
+use super::{Group, RunResult, Runs};
+use crate::method::METHODS;
+
+/// Shares of success of which the tables say when they were reached.
+const SHARES: [f64; 3] = [0.5, 0.8, 0.95];
+
+/// The groups of a report: tasks in order of appearance, in each the settings in theirs, in each
+/// the methods in the registry's order.
+fn groups(runs: &Runs) -> Vec<Group> {
+    let (mut tasks, mut settings, mut groups) = (Vec::new(), Vec::new(), Vec::new());
+    for run in &runs.runs {
+        let group = Group::of(&run.key);
+        if !tasks.contains(&group.task) {
+            tasks.push(group.task.clone());
+        }
+        if !settings.contains(&group.setting) {
+            settings.push(group.setting.clone());
+        }
+        if !groups.contains(&group) {
+            groups.push(group);
+        }
+    }
+    let place = |list: &[String], name: &str| list.iter().position(|known| known == name);
+    let rank = |method: &str| METHODS.iter().position(|m| m.name == method);
+    groups.sort_by_key(|group| {
+        let method = rank(&group.method).unwrap_or(METHODS.len());
+        (
+            place(&tasks, &group.task),
+            place(&settings, &group.setting),
+            method,
+        )
+    });
+    groups
+}
+
+/// The runs of a group by seed.
+fn members<'a>(runs: &'a Runs, group: &Group) -> Vec<&'a RunResult> {
+    let mut members: Vec<&RunResult> = runs
+        .runs
+        .iter()
+        .filter(|run| Group::of(&run.key) == *group)
+        .collect();
+    members.sort_by_key(|run| run.key.seed);
+    members
+}
+
+/// The whole report as Markdown.
+pub(super) fn markdown(runs: &Runs) -> String {
+    let mut text = String::from(
+        "# Report\n\nA run's score is the mean of its last ten evaluations, each of the same held-out episodes. \
+         Over seeds: interquartile mean with its 95 % bootstrap interval. Area: mean height of the curve. \
+         Reached: the first evaluation with that success, median over the seeds that got there.\n",
+    );
+    let groups = groups(runs);
+    let mut tasks: Vec<&str> = groups.iter().map(|group| group.task.as_str()).collect();
+    tasks.dedup();
+    for task in tasks {
+        let of_task: Vec<&Group> = groups.iter().filter(|group| group.task == task).collect();
+        add(&mut text, format!("\n## {task}\n"));
+        scores(&mut text, runs, &of_task);
+        differences(&mut text, runs, &of_task);
+        alignment(&mut text, runs, &of_task);
+    }
+    over_all_tasks(&mut text, runs, &groups);
+    failures(&mut text, runs);
+    origin(&mut text, runs);
+    text
+}
+
+fn scores(text: &mut String, runs: &Runs, groups: &[&Group]) {
+    text.push_str(
+        "\n| method | setting | seeds | score | by seed | area | labels (steps) to 50 % | to 80 % | to 95 % |\n\
+         |---|---|---:|---|---|---|---|---|---|\n",
+    );
+    for group in groups {
+        let members = members(runs, group);
+        let of = |f: fn(&RunResult) -> f64| members.iter().map(|run| f(run)).collect::<Vec<_>>();
+        let is_rate = members.iter().all(|run| run.end.has_success);
+        let scores = of(|run| score(run).value);
+        let by_seed: Vec<String> = scores.iter().map(|s| number(*s, is_rate)).collect();
+        let fewest = members.iter().map(|run| score(run).n_evaluations).min();
+        let note = match fewest {
+            Some(n) if n < 10 => format!(" (last {n})"),
+            _ => String::new(),
+        };
+        add(
+            text,
+            format!(
+                "| {} | {} | {} | {}{note} | {} | {} |",
+                group.method,
+                or_dash(&group.setting),
+                members.len(),
+                center(&scores, is_rate),
+                by_seed.join(", "),
+                center(&of(area), is_rate)
+            ),
+        );
+        for share in SHARES {
+            let when: Vec<Option<Reached>> =
+                members.iter().map(|run| reached(run, share)).collect();
+            add(
+                text,
+                format!(" {} |", if is_rate { told(&when) } else { "–".into() }),
+            );
+        }
+        text.push('\n');
+    }
+}
+
+/// `24 (12000), 4 of 5 seeds`
+fn told(when: &[Option<Reached>]) -> String {
+    let mut there: Vec<Reached> = when.iter().flatten().copied().collect();
+    if there.is_empty() {
+        return "never".into();
+    }
+    there.sort_by_key(|reached| reached.step);
+    let middle = there[(there.len() - 1) / 2];
+    let n = if there.len() < when.len() {
+        format!(", {} of {} seeds", there.len(), when.len())
+    } else {
+        String::new()
+    };
+    format!("{} ({}){n}", middle.labels, middle.step)
+}
+
+/// The first method against every other in the same setting; where there is one method alone,
+/// the first setting against every other.
+fn differences(text: &mut String, runs: &Runs, groups: &[&Group]) {
+    let mut lines = String::new();
+    for (first, second) in pairs(groups) {
+        let (a, b) = (members(runs, first), members(runs, second));
+        let paired: Vec<(&RunResult, &RunResult)> = a
+            .iter()
+            .filter_map(|run| {
+                let other = b.iter().find(|other| other.key.seed == run.key.seed)?;
+                Some((*run, *other))
+            })
+            .collect();
+        let is_rate = a.iter().all(|run| run.end.has_success);
+        let of = |f: &dyn Fn(&RunResult) -> f64| {
+            let pairs: Vec<(f64, f64)> = paired.iter().map(|(a, b)| (f(a), f(b))).collect();
+            difference(&pairs, is_rate)
+        };
+        let stage: Vec<(f64, f64)> = paired
+            .iter()
+            .filter_map(|(a, b)| Some((same_stage(a)?, same_stage(b)?)))
+            .collect();
+        let named = |group: &Group| match group.setting.as_str() {
+            "" => group.method.clone(),
+            setting => format!("{} ({setting})", group.method),
+        };
+        add(
+            &mut lines,
+            format!(
+                "| {} − {} | {} | {} | {} | {} |\n",
+                named(first),
+                named(second),
+                paired.len(),
+                of(&|run| score(run).value),
+                of(&area),
+                difference(&stage, true)
+            ),
+        );
+    }
+    if !lines.is_empty() {
+        text.push_str(
+            "\nDifferences between runs of the same seed, mean with its 95 % bootstrap interval; bold where it excludes 0:\n\n\
+             | difference | seeds | of scores | of areas | of pairs in one true stage |\n|---|---:|---|---|---|\n",
+        );
+        text.push_str(&lines);
+    }
+}
+
+fn pairs<'a>(groups: &[&'a Group]) -> Vec<(&'a Group, &'a Group)> {
+    let is_one_method = groups.iter().all(|group| group.method == groups[0].method);
+    if is_one_method {
+        return groups
+            .iter()
+            .skip(1)
+            .map(|other| (groups[0], *other))
+            .collect();
+    }
+    let mut pairs = Vec::new();
+    for (n, group) in groups.iter().enumerate() {
+        // Methods of a setting stand together, the first one first.
+        let first = groups
+            .iter()
+            .position(|other| other.setting == group.setting);
+        pairs.extend(
+            first
+                .filter(|first| *first < n)
+                .map(|first| (groups[first], *group)),
+        );
+    }
+    pairs
+}
+
+fn difference(pairs: &[(f64, f64)], is_rate: bool) -> String {
+    Bootstrap::default().paired_difference(pairs).map_or_else(
+        || "–".into(),
+        |found| {
+            let told = estimate(&found, is_rate);
+            let is_sure = pairs.len() > 2 && !found.interval.contains(0.0);
+            if is_sure { format!("**{told}**") } else { told }
+        },
+    )
+}
+
+/// How far chosen pairs lie within a stage.
+fn alignment(text: &mut String, runs: &Runs, groups: &[&Group]) {
+    let mut lines = String::new();
+    for group in groups {
+        let members = members(runs, group);
+        let of = |f: fn(&RunResult) -> Option<f64>| -> Vec<f64> {
+            members.iter().filter_map(|run| f(run)).collect()
+        };
+        let (same, ratio) = (of(same_stage), of(gap_ratio));
+        if same.is_empty() && ratio.is_empty() {
+            continue;
+        }
+        add(
+            &mut lines,
+            format!(
+                "| {} | {} | {} | {} |\n",
+                group.method,
+                or_dash(&group.setting),
+                center(&same, true),
+                center(&ratio, true)
+            ),
+        );
+    }
+    if !lines.is_empty() {
+        text.push_str(
+            "\nSessions in which the method chose:\n\n\
+             | method | setting | pairs in one true stage | stage gap, chosen by candidates |\n|---|---|---|---|\n",
+        );
+        text.push_str(&lines);
+    }
+}
+
+/// Methods that are there on every task that is solved or not, with as many strata as tasks.
+fn over_all_tasks(text: &mut String, runs: &Runs, groups: &[Group]) {
+    let solved = |run: &RunResult| run.end.has_success;
+    let mut tasks: Vec<&str> = Vec::new();
+    for run in runs.runs.iter().filter(|run| solved(run)) {
+        if !tasks.contains(&run.key.task.as_str()) {
+            tasks.push(&run.key.task);
+        }
+    }
+    if tasks.len() < 2 {
+        return;
+    }
+    add(
+        text,
+        format!(
+            "\n## All {} tasks\n\nSeeds are drawn again within each task (stratified).\n\n\
+             | method | setting | score |\n|---|---|---|\n",
+            tasks.len()
+        ),
+    );
+    for group in groups.iter().filter(|group| group.task == tasks[0]) {
+        let strata: Vec<Vec<f64>> = tasks
+            .iter()
+            .map(|task| {
+                let on_task = Group {
+                    task: (*task).to_owned(),
+                    ..group.clone()
+                };
+                members(runs, &on_task)
+                    .iter()
+                    .map(|run| score(run).value)
+                    .collect()
+            })
+            .collect();
+        if strata.iter().any(Vec::is_empty) {
+            continue;
+        }
+        let found = Bootstrap::default().stratified(&strata, interquartile_mean);
+        let told = found.map_or_else(|| "–".into(), |found| estimate(&found, true));
+        add(
+            text,
+            format!(
+                "| {} | {} | {told} |\n",
+                group.method,
+                or_dash(&group.setting)
+            ),
+        );
+    }
+}
+
+fn failures(text: &mut String, runs: &Runs) {
+    if runs.failed.is_empty() {
+        return;
+    }
+    text.push_str("\n## Failed\n\n");
+    for (key, reason) in &runs.failed {
+        add(text, format!("- {}: {reason}\n", key.name()));
+    }
+}
+
+/// Where the rows are from.
+fn origin(text: &mut String, runs: &Runs) {
+    let mut machines: Vec<&str> = runs
+        .runs
+        .iter()
+        .map(|run| run.end.machine.as_str())
+        .collect();
+    machines.sort_unstable();
+    machines.dedup();
+    let wall: f64 = runs.runs.iter().map(|run| run.end.wall_s).sum();
+    let revisions = revisions(runs.runs.iter());
+    add(
+        text,
+        format!(
+            "\n## Origin\n\n{} runs, {:.1} hours of them added up. Machine: {}. Revision: {}.{}\n",
+            runs.runs.len(),
+            wall / 3_600.0,
+            machines.join("; "),
+            counted(&revisions),
+            if revisions.len() > 1 {
+                " Rows of different revisions stand side by side; numbers may differ for that alone."
+            } else {
+                ""
+            }
+        ),
+    );
+}
+
+/// Every run in a line.
+pub(super) fn csv(runs: &Runs) -> String {
+    let mut text = String::from(
+        "task,method,teacher,setting,seed,score,area,labels,total_steps,same_stage,gap_ratio,\
+         labels_to_50,steps_to_50,labels_to_80,steps_to_80,labels_to_95,steps_to_95,revision,settings,wall_s\n",
+    );
+    for group in groups(runs) {
+        for run in members(runs, &group) {
+            let key = &run.key;
+            let optional = |value: Option<f64>| value.map_or_else(String::new, |v| v.to_string());
+            add(
+                &mut text,
+                format!(
+                    "{},{},{},\"{}\",{},{},{},{},{},{},{}",
+                    key.task,
+                    key.method,
+                    key.teacher,
+                    key.setting.replace('"', "\"\""),
+                    key.seed,
+                    score(run).value,
+                    area(run),
+                    run.end.labels,
+                    run.end.total_steps,
+                    optional(same_stage(run)),
+                    optional(gap_ratio(run))
+                ),
+            );
+            for share in SHARES {
+                let when = reached(run, share).filter(|_| run.end.has_success);
+                let told = when.map_or_else(|| ",".into(), |r| format!("{},{}", r.labels, r.step));
+                add(&mut text, format!(",{told}"));
+            }
+            let end = &run.end;
+            add(
+                &mut text,
+                format!(",{},{},{:.0}\n", end.revision, end.settings, end.wall_s),
+            );
+        }
+    }
+    text
+}
+
+fn center(values: &[f64], is_rate: bool) -> String {
+    let found = Bootstrap::default().center(values, interquartile_mean);
+    found.map_or_else(|| "–".into(), |found| estimate(&found, is_rate))
+}
+
+fn estimate(found: &Estimate, is_rate: bool) -> String {
+    let told = |value| number(value, is_rate);
+    let (lo, hi) = (told(found.interval.lo), told(found.interval.hi));
+    format!("{} [{lo}, {hi}]", told(found.value))
+}
+
+fn number(value: f64, is_rate: bool) -> String {
+    if is_rate {
+        format!("{value:.2}")
+    } else {
+        format!("{value:.0}")
+    }
+}
+
+fn or_dash(text: &str) -> &str {
+    if text.is_empty() { "–" } else { text }
+}
+
+fn add(text: &mut String, more: impl AsRef<str>) {
+    text.push_str(more.as_ref());
+}

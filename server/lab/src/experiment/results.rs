@@ -1,0 +1,293 @@
+//! What runs of a grid came to, as rows: one JSON object a line, complete without any run's folder.
+//!
+//! `results.jsonl` is only added to. The rows of a run are added together when it is over, its
+//! `finished` row last; rows without one are what a kill left behind, and count for nothing.
+
+use serde::{Deserialize, Serialize};
+
+use super::grid::RunKey;
+use crate::config::{ConfigError, RunConfig};
+use crate::message::Event;
+use crate::method;
+
+mod folder;
+
+pub use folder::{GridFolder, Misfit, RunHistory, StoreError};
+
+/// One line of `results.jsonl`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Row {
+    /// Which run.
+    #[serde(flatten)]
+    pub key: RunKey,
+    /// What it says.
+    #[serde(flatten)]
+    pub content: Content,
+}
+
+/// What a row says about its run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Content {
+    /// The policy on held-out episodes.
+    Evaluation(EvaluationRow),
+    /// A session of queries as it was asked.
+    Session(SessionRow),
+    /// All rows of the run are above.
+    Finished(RunRow),
+    /// The run could not go on; it is tried again at the next start.
+    Failed {
+        /// For the person who reads it.
+        reason: String,
+        /// Of the program.
+        revision: String,
+    },
+}
+
+/// The policy on held-out episodes.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct EvaluationRow {
+    /// Environment steps taken.
+    pub step: u64,
+    /// Answers so far, skips not counted.
+    pub labels: u32,
+    /// Share of episodes with success, [0, 1].
+    pub success_rate: f64,
+    /// Mean task return.
+    pub return_mean: f64,
+    /// Correlation of learned and task reward over the steps of some of the episodes.
+    pub reward_correlation: Option<f64>,
+}
+
+/// A session of queries as it was asked. Means; `None` where the method has no such number.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SessionRow {
+    /// Environment steps taken.
+    pub step: u64,
+    /// From 0; the first is always random.
+    pub session: u32,
+    /// Queries asked.
+    pub n_queries: u32,
+    /// Of the chosen queries.
+    pub disagreement_chosen: Option<f64>,
+    /// Of all candidates.
+    pub disagreement_pool: Option<f64>,
+    /// Of the chosen queries, nats.
+    pub stage_gap_chosen: Option<f64>,
+    /// Of all candidates, nats.
+    pub stage_gap_pool: Option<f64>,
+    /// Share of chosen queries within one true stage, [0, 1].
+    pub same_stage_chosen: Option<f64>,
+}
+
+/// A run that is over, with all that comparing it needs.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RunRow {
+    /// Environment steps taken.
+    pub total_steps: u64,
+    /// Answers that it was given.
+    pub labels: u32,
+    /// Answers that it might have used; 0 for a method that asks nothing.
+    pub budget: u32,
+    /// Episodes in an evaluation.
+    pub evaluation_episodes: u32,
+    /// Environment steps between evaluations.
+    pub evaluation_every: u64,
+    /// Whether the task is solved or not, rather than done better or worse.
+    pub has_success: bool,
+    /// Fingerprint of the final weights: equal for bit-identical runs.
+    pub weights: String,
+    /// Fingerprint of the resolved settings, which lie beside as `settings/FINGERPRINT.toml`.
+    pub settings: String,
+    /// Of the program, `A then B` where it changed in between.
+    pub revision: String,
+    /// Processor and cores of the machine.
+    pub machine: String,
+    /// Wall time, seconds, with whatever else ran on the machine.
+    pub wall_s: f64,
+}
+
+/// Where rows come from.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Provenance {
+    /// Of the program.
+    pub revision: String,
+    /// Processor and cores of the machine.
+    pub machine: String,
+}
+
+/// The rows of a finished run from its settings and its metrics; `None` while it is not over.
+///
+/// # Errors
+/// When a line of the metrics is no event.
+pub fn rows_of_run(
+    key: &RunKey,
+    config: &RunConfig,
+    metrics: &str,
+    history: &RunHistory,
+) -> Result<Option<Vec<Row>>, ConfigError> {
+    let row = |content| Row {
+        key: key.clone(),
+        content,
+    };
+    let mut rows = Vec::new();
+    for (n, line) in metrics.lines().enumerate() {
+        let event = serde_json::from_str(line).map_err(|error| ConfigError::Invalid {
+            origin: format!("metrics of {}", key.name()),
+            message: format!("line {}: {error}", n + 1),
+        })?;
+        match event {
+            Event::Evaluation(e) => rows.push(row(Content::Evaluation(EvaluationRow {
+                step: e.step,
+                labels: e.labels,
+                success_rate: e.success_rate,
+                return_mean: e.return_mean,
+                reward_correlation: e.reward_correlation,
+            }))),
+            Event::SessionOffered(s) => rows.push(row(Content::Session(SessionRow {
+                step: s.step,
+                session: s.session,
+                n_queries: s.n_queries,
+                disagreement_chosen: s.disagreement_chosen,
+                disagreement_pool: s.disagreement_pool,
+                stage_gap_chosen: s.stage_gap_chosen,
+                stage_gap_pool: s.stage_gap_pool,
+                same_stage_chosen: s.same_stage_chosen,
+            }))),
+            Event::Finished(f) => {
+                let asks = method::find(&config.method)
+                    .is_ok_and(|method| (method.build)(config).sampler.is_some());
+                rows.push(row(Content::Finished(RunRow {
+                    total_steps: f.step,
+                    labels: f.labels,
+                    budget: if asks { config.feedback.budget } else { 0 },
+                    evaluation_episodes: config.evaluation.episodes,
+                    evaluation_every: config.evaluation.every,
+                    has_success: has_success(&config.task),
+                    weights: f.weights,
+                    settings: fingerprint(config),
+                    revision: history.revisions.join(" then "),
+                    machine: history.machines.join(" then "),
+                    wall_s: history.wall_s,
+                })));
+                return Ok(Some(rows));
+            }
+            _ => {}
+        }
+    }
+    Ok(None)
+}
+
+/// Whether a task is solved or not; the running and walking ones are done better or worse.
+fn has_success(task: &str) -> bool {
+    let moves = [
+        "walker-run",
+        "quadruped-walk",
+        "quadruped-run",
+        "cheetah-run",
+    ];
+    !moves.contains(&task)
+}
+
+/// Of resolved settings without their seed, so that the seeds of a group share it: 16
+/// hexadecimal digits, FNV-1a.
+pub fn fingerprint(config: &RunConfig) -> String {
+    let text = without_seed(config).to_toml();
+    let mix = |hash: u64, byte: u8| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
+    format!("{:016x}", text.bytes().fold(0xcbf2_9ce4_8422_2325, mix))
+}
+
+fn without_seed(config: &RunConfig) -> RunConfig {
+    RunConfig {
+        seed: 0,
+        ..config.clone()
+    }
+}
+
+/// A file of rows, read.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Results {
+    /// Every run that is over, in order of its rows.
+    pub runs: Vec<RunResult>,
+    /// Runs that could not go on and have not been finished since: which, and why.
+    pub failed: Vec<(RunKey, String)>,
+    /// Bytes up to the end of the last row that counts.
+    pub len: u64,
+}
+
+/// All rows of a finished run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RunResult {
+    /// Which.
+    pub key: RunKey,
+    /// In order of steps.
+    pub evaluations: Vec<EvaluationRow>,
+    /// In order of steps.
+    pub sessions: Vec<SessionRow>,
+    /// How it ended.
+    pub end: RunRow,
+}
+
+impl Results {
+    /// Reads rows; what a kill left unfinished at the end is left out.
+    ///
+    /// # Errors
+    /// A line in between that is no row, with its file and line; a run that is there twice.
+    pub fn parse(name: &str, text: &str) -> Result<Self, ConfigError> {
+        let mut results = Self::default();
+        let (mut evaluations, mut sessions, mut at) = (Vec::new(), Vec::new(), 0_u64);
+        let n_lines = text.lines().count();
+        for (n, line) in text.split_inclusive('\n').enumerate() {
+            at += line.len() as u64;
+            let is_cut_short = n + 1 == n_lines && !line.ends_with('\n');
+            if is_cut_short || line.trim().is_empty() {
+                continue;
+            }
+            let row: Row = serde_json::from_str(line).map_err(|error| ConfigError::Invalid {
+                origin: name.to_owned(),
+                message: format!("line {}: {error}", n + 1),
+            })?;
+            let of_run = |(key, _): &(RunKey, _)| *key == row.key;
+            match row.content {
+                Content::Evaluation(e) => evaluations.push((row.key, e)),
+                Content::Session(s) => sessions.push((row.key, s)),
+                Content::Failed { reason, .. } => {
+                    results.failed.retain(|f| !of_run(f));
+                    results.failed.push((row.key, reason));
+                    results.len = at;
+                }
+                Content::Finished(end) => {
+                    if results.runs.iter().any(|run| run.key == row.key) {
+                        return Err(ConfigError::Invalid {
+                            origin: name.to_owned(),
+                            message: format!("line {}: {} is there twice", n + 1, row.key.name()),
+                        });
+                    }
+                    results.failed.retain(|f| f.0 != row.key);
+                    results.runs.push(RunResult {
+                        evaluations: own(&mut evaluations, &row.key),
+                        sessions: own(&mut sessions, &row.key),
+                        key: row.key,
+                        end,
+                    });
+                    results.len = at;
+                }
+            }
+        }
+        Ok(results)
+    }
+
+    /// The finished run of that key.
+    pub fn run(&self, key: &RunKey) -> Option<&RunResult> {
+        self.runs.iter().find(|run| run.key == *key)
+    }
+}
+
+/// Takes the rows of one run; others are those of a run that was never finished.
+fn own<T>(rows: &mut Vec<(RunKey, T)>, key: &RunKey) -> Vec<T> {
+    let taken = rows.drain(..).filter(|(of, _)| of == key);
+    taken.map(|(_, row)| row).collect()
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,368 @@
+//! The folder of a grid: results, settings, and a folder for each run under way.
+//!
+//! ```text
+//! experiment.toml       the file as it was given
+//! results.jsonl         rows of the runs that are over
+//! settings/HASH.toml    resolved settings by fingerprint, seeds left out
+//! runs/NAME/            a run: its folder, history.json, log.txt
+//! progress.json         where the grid is, while it runs
+//! log.jsonl             what runs said at their end; locked while any of them is up
+//! ```
+
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, Write as _};
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use super::{Content, Provenance, Results, Row, fingerprint, without_seed};
+use crate::config::{ConfigError, RunConfig};
+use crate::experiment::grid::{GridRun, RunKey};
+
+/// What ran when: kept beside a run's folder, across stops and kills.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct RunHistory {
+    /// Of the program, in order, each once.
+    pub revisions: Vec<String>,
+    /// Machines, in order, each once.
+    pub machines: Vec<String>,
+    /// Wall time so far, seconds.
+    pub wall_s: f64,
+}
+
+impl RunHistory {
+    /// Notes who goes on with the run now.
+    pub fn goes_on(&mut self, provenance: &Provenance) {
+        let add = |list: &mut Vec<String>, item: &str| {
+            if list.last().is_none_or(|last| last != item) {
+                list.push(item.to_owned());
+            }
+        };
+        add(&mut self.revisions, &provenance.revision);
+        add(&mut self.machines, &provenance.machine);
+    }
+}
+
+/// Why a grid's folder cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum StoreError {
+    /// The disk.
+    #[error("cannot {doing} ({path}): {source}")]
+    Io {
+        /// What was tried.
+        doing: &'static str,
+        /// Where.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// Rows or settings that cannot be read.
+    #[error(transparent)]
+    Text(#[from] ConfigError),
+    /// Results that do not belong to this grid.
+    #[error(transparent)]
+    Misfit(#[from] Misfit),
+}
+
+/// Results that do not belong to this grid or this program.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum Misfit {
+    /// A run of this name was done with other settings.
+    #[error(
+        "{run} is there already with {key} = {there}, but the file now says {here}; put it back, or choose another --out"
+    )]
+    OtherSettings {
+        /// The run.
+        run: String,
+        /// The first setting that differs.
+        key: String,
+        /// Its value in the folder.
+        there: String,
+        /// Its value in the file.
+        here: String,
+    },
+    /// Rows that another version of the program made.
+    #[error(
+        "{n} finished runs are of revision {there}, this program is {here} (the first: {run}); their numbers may differ for that alone. Choose another --out, or allow it with --mixed"
+    )]
+    OtherRevision {
+        /// How many.
+        n: usize,
+        /// The first of them.
+        run: String,
+        /// Their revision.
+        there: String,
+        /// Of this program.
+        here: String,
+    },
+}
+
+/// The folder of a grid.
+#[derive(Debug, Clone)]
+pub struct GridFolder {
+    root: PathBuf,
+}
+
+impl GridFolder {
+    /// The folder at a path, whether it exists or not.
+    pub fn at(root: &Path) -> Self {
+        Self {
+            root: root.to_owned(),
+        }
+    }
+
+    /// Makes it, and keeps the file that it belongs to.
+    ///
+    /// # Errors
+    /// When the disk refuses.
+    pub fn create(&self, text: &str) -> Result<(), StoreError> {
+        for folder in ["runs", "settings"] {
+            let path = self.root.join(folder);
+            fs::create_dir_all(&path).map_err(refused("make the experiment's folder", &path))?;
+        }
+        self.replace("experiment.toml", text)
+    }
+
+    /// The log, which whoever works on the grid holds locked: a run that was started from here
+    /// writes to the same open file, so that the lock lasts until the last of them has ended.
+    ///
+    /// # Errors
+    /// When the disk refuses.
+    pub fn log_file(&self) -> Result<File, StoreError> {
+        let path = self.root.join("log.jsonl");
+        let file = OpenOptions::new().create(true).append(true).open(&path);
+        file.map_err(refused("open the experiment's log", &path))
+    }
+
+    /// Where the rows are.
+    pub fn results_path(&self) -> PathBuf {
+        self.root.join("results.jsonl")
+    }
+
+    /// The folder of a run.
+    pub fn run_path(&self, key: &RunKey) -> PathBuf {
+        self.root.join("runs").join(key.name())
+    }
+
+    /// The rows so far; none where there is no file yet.
+    ///
+    /// # Errors
+    /// A file that cannot be read, a line that is no row.
+    pub fn results(&self) -> Result<Results, StoreError> {
+        let path = self.results_path();
+        let text = match fs::read_to_string(&path) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => String::new(),
+            read => read.map_err(refused("read the results", &path))?,
+        };
+        Ok(Results::parse(&path.display().to_string(), &text)?)
+    }
+
+    /// Adds the rows of one run, durably. What a kill left behind the last row that counts is
+    /// cut first.
+    ///
+    /// # Errors
+    /// When the disk refuses.
+    ///
+    /// # Panics
+    /// Never: rows are plain values.
+    pub fn add(&self, rows: &[Row]) -> Result<(), StoreError> {
+        let len = self.results()?.len;
+        let path = self.results_path();
+        let mut text = String::new();
+        for row in rows {
+            text.push_str(&serde_json::to_string(row).expect("rows are plain values"));
+            text.push('\n');
+        }
+        let file = OpenOptions::new().create(true).append(true).open(&path);
+        let added = file.and_then(|mut file| {
+            file.set_len(len)?;
+            file.write_all(text.as_bytes())?;
+            file.sync_all()
+        });
+        added.map_err(refused("add to the results", &path))
+    }
+
+    /// Marks a run as failed, with its reason.
+    ///
+    /// # Errors
+    /// When the disk refuses.
+    pub fn add_failure(
+        &self,
+        key: &RunKey,
+        reason: &str,
+        revision: &str,
+    ) -> Result<(), StoreError> {
+        self.add(&[Row {
+            key: key.clone(),
+            content: Content::Failed {
+                reason: reason.to_owned(),
+                revision: revision.to_owned(),
+            },
+        }])
+    }
+
+    /// Keeps resolved settings under their fingerprint; the path of the file.
+    ///
+    /// # Errors
+    /// When the disk refuses.
+    pub fn keep_settings(&self, config: &RunConfig) -> Result<PathBuf, StoreError> {
+        let name = format!("settings/{}.toml", fingerprint(config));
+        self.replace(&name, &without_seed(config).to_toml())?;
+        Ok(self.root.join(name))
+    }
+
+    /// What is known of a run that was started; nothing of one that was not.
+    pub fn history(&self, key: &RunKey) -> RunHistory {
+        let text = fs::read_to_string(self.run_path(key).join("history.json"));
+        text.ok()
+            .and_then(|text| serde_json::from_str(&text).ok())
+            .unwrap_or_default()
+    }
+
+    /// Keeps it.
+    ///
+    /// # Errors
+    /// When the disk refuses.
+    ///
+    /// # Panics
+    /// Never: a history is plain values.
+    pub fn keep_history(&self, key: &RunKey, history: &RunHistory) -> Result<(), StoreError> {
+        let path = self.run_path(key);
+        fs::create_dir_all(&path).map_err(refused("make the run's folder", &path))?;
+        let text = serde_json::to_string(history).expect("a history is plain values");
+        self.replace(&format!("runs/{}/history.json", key.name()), &text)
+    }
+
+    /// Refuses results that the runs of a grid do not fit: other settings under the same name,
+    /// and, unless they may be mixed, rows of another revision.
+    ///
+    /// # Errors
+    /// [`Misfit`] names the run and what differs.
+    pub fn check(
+        &self,
+        runs: &[GridRun],
+        results: &Results,
+        revision: Option<&str>,
+    ) -> Result<(), StoreError> {
+        for run in runs {
+            let there = match results.run(&run.key) {
+                Some(done) if done.end.settings == fingerprint(&run.config) => continue,
+                Some(done) => self
+                    .root
+                    .join(format!("settings/{}.toml", done.end.settings)),
+                None => self.run_path(&run.key).join("config.toml"),
+            };
+            let Ok(text) = fs::read_to_string(&there) else {
+                continue; // not started
+            };
+            let there = RunConfig::parse(&there.display().to_string(), &text)?;
+            if let Some((key, there, here)) = first_difference(&there, &run.config) {
+                let run = run.key.name();
+                return Err(Misfit::OtherSettings {
+                    run,
+                    key,
+                    there,
+                    here,
+                }
+                .into());
+            }
+        }
+        let Some(here) = revision else { return Ok(()) };
+        let others: Vec<_> = results
+            .runs
+            .iter()
+            .filter(|run| run.end.revision != here)
+            .collect();
+        if let Some(first) = others.first() {
+            return Err(Misfit::OtherRevision {
+                n: others.len(),
+                run: first.key.name(),
+                there: first.end.revision.clone(),
+                here: here.to_owned(),
+            }
+            .into());
+        }
+        Ok(())
+    }
+
+    /// Removes what only going on would need: replay and checkpoints. Settings, metrics and the
+    /// policy stay.
+    ///
+    /// # Errors
+    /// When the disk refuses.
+    pub fn slim(&self, key: &RunKey) -> Result<(), StoreError> {
+        let root = self.run_path(key);
+        let entries = fs::read_dir(&root).map_err(refused("read the run's folder", &root))?;
+        for entry in entries.flatten() {
+            let path = entry.path();
+            let name = entry.file_name().to_string_lossy().into_owned();
+            let removed = if name == "replay" {
+                fs::remove_dir_all(&path)
+            } else if name.starts_with("checkpoint-") {
+                fs::remove_file(&path)
+            } else {
+                continue;
+            };
+            removed.map_err(refused("remove what the run no longer needs", &path))?;
+        }
+        Ok(())
+    }
+
+    /// Writes a file so that readers see the old or the new one, never half.
+    ///
+    /// # Errors
+    /// When the disk refuses.
+    pub fn replace(&self, name: &str, text: &str) -> Result<(), StoreError> {
+        let path = self.root.join(name);
+        let draft = path.with_extension("draft");
+        let written = File::create(&draft).and_then(|mut file| {
+            file.write_all(text.as_bytes())?;
+            file.sync_all()?;
+            fs::rename(&draft, &path)
+        });
+        written.map_err(refused("save", &path))
+    }
+}
+
+/// The first setting in which two trees differ, seeds aside: dotted path, and both values.
+fn first_difference(there: &RunConfig, here: &RunConfig) -> Option<(String, String, String)> {
+    let flat = |config: &RunConfig| {
+        let tree: toml::Table = toml::from_str(&without_seed(config).to_toml()).unwrap_or_default();
+        let mut leaves = Vec::new();
+        flatten("", &toml::Value::Table(tree), &mut leaves);
+        leaves
+    };
+    let (there, here) = (flat(there), flat(here));
+    let value = |leaves: &[(String, String)], key: &str| {
+        let found = leaves.iter().find(|(k, _)| k == key);
+        found.map_or_else(|| "nothing".to_owned(), |(_, value)| value.clone())
+    };
+    let mut keys = there.iter().chain(&here).map(|(key, _)| key);
+    keys.find_map(|key| {
+        let (there, here) = (value(&there, key), value(&here, key));
+        (there != here).then(|| (key.clone(), there, here))
+    })
+}
+
+fn flatten(path: &str, value: &toml::Value, leaves: &mut Vec<(String, String)>) {
+    let toml::Value::Table(table) = value else {
+        leaves.push((path.to_owned(), value.to_string()));
+        return;
+    };
+    for (key, value) in table {
+        let path = if path.is_empty() {
+            key.clone()
+        } else {
+            format!("{path}.{key}")
+        };
+        flatten(&path, value, leaves);
+    }
+}
+
+fn refused<'a>(doing: &'static str, path: &'a Path) -> impl FnOnce(io::Error) -> StoreError + 'a {
+    move |source| StoreError::Io {
+        doing,
+        path: path.to_owned(),
+        source,
+    }
+}

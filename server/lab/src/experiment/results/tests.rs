@@ -1,0 +1,168 @@
+use super::*;
+use crate::experiment::grid::GridRun;
+
+const METRICS: &str = "{\"kind\":\"evaluation\",\"step\":500,\"labels\":4,\"episodes\":10,\"success_rate\":0.5,\
+\"return_mean\":7.5,\"return_std\":1.0,\"reward_correlation\":null}\n\
+{\"kind\":\"session_offered\",\"session\":1,\"step\":600,\"n_queries\":5,\"disagreement_chosen\":0.2,\
+\"disagreement_pool\":0.1,\"stage_gap_chosen\":1.0,\"stage_gap_pool\":2.0,\"same_stage_chosen\":0.8}\n";
+const END: &str = "{\"kind\":\"finished\",\"step\":900,\"labels\":9,\"success_rate\":0.5,\"return_mean\":7.5,\"weights\":\"ab\"}\n";
+
+fn key(seed: u64) -> RunKey {
+    RunKey {
+        task: "go-fetch-return".into(),
+        method: "stair".into(),
+        teacher: "oracle".into(),
+        setting: "80 labels".into(),
+        seed,
+    }
+}
+
+fn provenance(revision: &str) -> Provenance {
+    Provenance {
+        revision: revision.into(),
+        machine: "two cores".into(),
+    }
+}
+
+fn rows(seed: u64, revision: &str) -> Vec<Row> {
+    let mut history = RunHistory::default();
+    history.goes_on(&provenance(revision));
+    let config = RunConfig {
+        seed,
+        ..RunConfig::default()
+    };
+    let metrics = format!("{METRICS}{END}");
+    rows_of_run(&key(seed), &config, &metrics, &history)
+        .unwrap()
+        .unwrap()
+}
+
+/// A grid's folder that goes when the test ends.
+struct Place(std::path::PathBuf);
+
+impl Place {
+    fn new(name: &str) -> (Self, GridFolder) {
+        let path = std::env::temp_dir().join(format!("stair-grid-{name}-{}", std::process::id()));
+        let _ = std::fs::remove_dir_all(&path); // an earlier test run may have been killed
+        let folder = GridFolder::at(&path);
+        folder.create("title = \"x\"").unwrap();
+        (Self(path), folder)
+    }
+}
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0); // best effort: it is a temporary folder
+    }
+}
+
+#[test]
+fn a_run_becomes_rows_only_when_it_is_over() {
+    let config = RunConfig::default();
+    let open = rows_of_run(&key(1), &config, METRICS, &RunHistory::default()).unwrap();
+    assert_eq!(open, None);
+    let rows = rows(1, "abc");
+    assert_eq!(rows.len(), 3);
+    let Content::Finished(end) = &rows[2].content else {
+        panic!("the end comes last")
+    };
+    assert_eq!((end.labels, end.revision.as_str()), (9, "abc"));
+    assert_eq!(end.settings, fingerprint(&config));
+}
+
+#[test]
+fn settings_that_differ_by_their_seed_alone_share_a_fingerprint() {
+    let of = |seed, steps| {
+        let mut config = RunConfig {
+            seed,
+            ..RunConfig::default()
+        };
+        config.training.total_steps = steps;
+        fingerprint(&config)
+    };
+    assert_eq!(of(1, 10_000), of(2, 10_000));
+    assert_ne!(of(1, 10_000), of(1, 10_001));
+}
+
+#[test]
+fn rows_come_back_and_what_a_kill_left_is_cut() {
+    let (_place, folder) = Place::new("cut");
+    folder.add(&rows(1, "abc")).unwrap();
+    let whole = std::fs::read_to_string(folder.results_path()).unwrap();
+    let torn = whole.clone() + &whole.replace("\"seed\":1", "\"seed\":2")[..whole.len() - 20];
+    std::fs::write(folder.results_path(), torn).unwrap();
+    assert_eq!(folder.results().unwrap().runs.len(), 1);
+    folder.add(&rows(3, "abc")).unwrap();
+    let results = folder.results().unwrap();
+    let seeds: Vec<u64> = results.runs.iter().map(|run| run.key.seed).collect();
+    assert_eq!(seeds, [1, 3]);
+    assert_eq!(results.runs[1].evaluations.len(), 1);
+    assert_eq!(results.runs[1].sessions[0].stage_gap_pool, Some(2.0));
+}
+
+#[test]
+fn a_failure_counts_until_the_run_is_finished_after_all() {
+    let (_place, folder) = Place::new("failed");
+    folder.add_failure(&key(1), "out of memory", "abc").unwrap();
+    assert_eq!(
+        folder.results().unwrap().failed,
+        [(key(1), "out of memory".to_owned())]
+    );
+    folder.add(&rows(1, "abc")).unwrap();
+    let results = folder.results().unwrap();
+    assert!(results.failed.is_empty() && results.runs.len() == 1);
+}
+
+#[test]
+fn a_line_that_is_no_row_and_a_run_that_is_there_twice_are_named() {
+    let text: String = rows(1, "abc")
+        .iter()
+        .map(|row| serde_json::to_string(row).unwrap() + "\n")
+        .collect();
+    let told = Results::parse("r.jsonl", &format!("{text}{{}}\n{text}")).unwrap_err();
+    assert!(told.to_string().starts_with("r.jsonl: line 4"), "{told}");
+    let told = Results::parse("r.jsonl", &format!("{text}{text}")).unwrap_err();
+    assert!(
+        told.to_string().contains("line 6") && told.to_string().contains("twice"),
+        "{told}"
+    );
+}
+
+#[test]
+fn other_settings_under_the_same_name_and_rows_of_another_revision_are_named() {
+    let (_place, folder) = Place::new("misfit");
+    let config = RunConfig::default();
+    folder.keep_settings(&config).unwrap();
+    folder.add(&rows(1, "abc")).unwrap();
+    let results = folder.results().unwrap();
+    let mut runs = [GridRun {
+        key: key(1),
+        config,
+    }];
+    folder.check(&runs, &results, Some("abc")).unwrap();
+    let told = folder
+        .check(&runs, &results, Some("def"))
+        .unwrap_err()
+        .to_string();
+    assert!(
+        told.contains("abc") && told.contains("def") && told.contains("--mixed"),
+        "{told}"
+    );
+    folder.check(&runs, &results, None).unwrap();
+    runs[0].config.feedback.budget = 7;
+    let told = folder.check(&runs, &results, None).unwrap_err().to_string();
+    assert!(
+        told.contains("feedback.budget = 2000") && told.contains("says 7"),
+        "{told}"
+    );
+}
+
+#[test]
+fn a_history_names_each_revision_that_took_part_once() {
+    let mut history = RunHistory::default();
+    for revision in ["abc", "abc", "def"] {
+        history.goes_on(&provenance(revision));
+    }
+    assert_eq!(history.revisions, ["abc", "def"]);
+    assert_eq!(history.machines, ["two cores"]);
+}
