@@ -14,6 +14,7 @@ mod golden;
 mod openapi;
 mod render;
 mod serve;
+mod study;
 mod tasks;
 mod teach;
 mod train;
@@ -45,6 +46,7 @@ enum Command {
     Export(export::Args),
     Figure(figure::Args),
     Experiment(experiment::Args),
+    Study(study::Args),
     Openapi(openapi::Args),
 }
 
@@ -83,6 +85,7 @@ pub fn main() -> ExitCode {
         Command::Export(args) => export::run(&args),
         Command::Figure(args) => figure::run(&args),
         Command::Experiment(args) => experiment::run(&args),
+        Command::Study(args) => study::run(&args),
         Command::Openapi(args) => openapi::run(&args),
     };
     result.unwrap_or_else(|error| {
