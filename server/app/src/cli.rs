@@ -15,6 +15,7 @@ mod interrupt;
 mod openapi;
 mod render;
 mod serve;
+mod study;
 mod tasks;
 mod teach;
 mod train;
@@ -46,6 +47,7 @@ enum Command {
     Export(export::Args),
     Figure(figure::Args),
     Experiment(experiment::Args),
+    Study(study::Args),
     Openapi(openapi::Args),
 }
 
@@ -84,6 +86,7 @@ pub fn main() -> ExitCode {
         Command::Export(args) => export::run(&args),
         Command::Figure(args) => figure::run(&args),
         Command::Experiment(args) => experiment::run(args),
+        Command::Study(args) => study::run(&args),
         Command::Openapi(args) => openapi::run(&args),
     };
     result.unwrap_or_else(|error| {

@@ -13,4 +13,5 @@ pub mod sampler;
 pub mod scene;
 pub mod schedule;
 pub mod stage;
+pub mod study;
 pub mod teacher;

@@ -14,6 +14,7 @@ pub mod method;
 pub mod nearest;
 pub mod policy;
 pub mod run;
+pub mod study;
 
 mod candidates;
 mod folder;

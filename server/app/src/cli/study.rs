@@ -1,0 +1,115 @@
+//! `stair study`: studies with people, from one file each.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::Subcommand;
+use domain::query::Question;
+use lab::nearest::nearest;
+use lab::study::{READY, StudyFile};
+
+use super::BadInput;
+
+/// Studies with people, from one file each
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(subcommand)]
+    action: Action,
+}
+
+#[derive(Debug, Subcommand)]
+enum Action {
+    /// Look for mistakes in a study's file, and say what the study asks of labelers
+    #[command(after_help = "Examples:
+  stair study check task-1          a study that comes with the program
+  stair study check my-study.toml")]
+    Check {
+        /// A file, or the name of a ready study: task-1, task-1-demo
+        file: PathBuf,
+    },
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// [`BadInput`] names each mistake of a file with its line.
+pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    let Action::Check { file } = &args.action;
+    print!("{}", described(&read(file)?));
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The study in a file, or the ready one of that name.
+fn read(path: &Path) -> anyhow::Result<StudyFile> {
+    let name = path.display().to_string();
+    let ready = READY.iter().find(|(ready, _)| *ready == name);
+    let text = match ready {
+        Some((_, text)) if !path.exists() => (*text).to_owned(),
+        _ => std::fs::read_to_string(path).map_err(|error| unreadable(&name, &error))?,
+    };
+    let folder = path.parent().unwrap_or(Path::new(""));
+    StudyFile::parse(&name, &text, folder).map_err(BadInput::from_error)
+}
+
+fn unreadable(name: &str, error: &std::io::Error) -> BadInput {
+    let ready: Vec<&str> = READY.iter().map(|(name, _)| *name).collect();
+    let hint = match nearest(name, &ready) {
+        Some(meant) => format!("did you mean the ready study '{meant}'?"),
+        None => format!("the ready studies are {}", ready.join(", ")),
+    };
+    BadInput(format!("cannot read {name}: {error}; {hint}"))
+}
+
+/// What the study asks, line by line.
+fn described(study: &StudyFile) -> String {
+    let asked = match study.question {
+        Question::Preference => "which of two segments is better",
+        Question::SameStage => "whether two segments show the same stage",
+    };
+    let (n_counted, n_practice, n_extra) = study.n_pairs();
+    let methods = study.source.methods();
+    let from = if methods.is_empty() {
+        "episodes of scripted experts".to_owned()
+    } else {
+        format!("queries of {}", methods.join(" and "))
+    };
+    format!(
+        "{}\n  asks      {asked}, {} steps each\n  tasks     {}\n  segments  from {from}\n  \
+         labelers  {} at most; each answers {n_counted} pairs, after {n_practice} for practice, with \
+         {n_extra} repeats and checks among them\nNo mistakes.\n",
+        study.title,
+        study.segment_len,
+        study.tasks.join(", "),
+        study.labelers_per_item,
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ready_study_is_described_by_its_name() {
+        let told = described(&read(Path::new("task-1")).unwrap());
+        assert!(told.contains("each answers 80 pairs"), "{told}");
+        assert!(told.contains("door-open, drawer-open"), "{told}");
+    }
+
+    #[test]
+    fn a_file_that_is_not_there_is_answered_with_the_ready_study_that_was_meant() {
+        let told = read(Path::new("task-1-dmeo")).unwrap_err();
+        assert!(told.is::<BadInput>() && told.to_string().contains("'task-1-demo'"));
+    }
+
+    #[test]
+    fn every_mistake_of_a_file_has_a_line_of_its_own() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("mine.toml");
+        std::fs::write(&path, "title = \"\"\ntasks = [\"windowopen\"]\n").unwrap();
+        let told = read(&path).unwrap_err().to_string();
+        assert!(told.contains("mine.toml: line 1: `title` must say something\n"));
+        assert!(
+            told.contains("line 2: there is no task 'windowopen'; did you mean 'window-open'?")
+        );
+    }
+}

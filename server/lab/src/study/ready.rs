@@ -1,0 +1,76 @@
+//! The studies that come with the program, as `assets/studies` has them.
+
+/// `(name, text)`, in the order in which lists show them.
+pub const READY: &[(&str, &str)] = &[
+    (
+        "task-1",
+        include_str!("../../../../assets/studies/task-1.toml"),
+    ),
+    (
+        "task-1-demo",
+        include_str!("../../../../assets/studies/task-1-demo.toml"),
+    ),
+];
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use domain::random::{Rng, Stream};
+    use sim::expert::rollout;
+
+    use super::*;
+    use crate::study::{Expected, KnownPair, Player, Shot, StudyFile};
+
+    fn ready() -> impl Iterator<Item = (&'static str, StudyFile)> {
+        READY.iter().map(|(name, text)| {
+            let file = format!("{name}.toml");
+            let study = StudyFile::parse(&file, text, Path::new("../../assets/studies"));
+            (*name, study.unwrap_or_else(|mistakes| panic!("{mistakes}")))
+        })
+    }
+
+    #[test]
+    fn every_ready_study_is_without_mistake() {
+        let sizes: Vec<_> = ready()
+            .map(|(name, study)| (name, study.n_pairs()))
+            .collect();
+        assert_eq!(
+            sizes,
+            [("task-1", (80, 2, 10)), ("task-1-demo", (20, 1, 3))]
+        );
+    }
+
+    #[test]
+    fn the_answers_that_a_ready_study_calls_right_are_right_by_the_task_reward() {
+        for (name, study) in ready() {
+            for pair in study.practice.iter().chain(&study.checks) {
+                let KnownPair { task, expects, .. } = pair;
+                let sum = |shot| reward_of(task, shot, study.segment_len);
+                let (first, second) = (sum(pair.first), sum(pair.second));
+                let better = match expects {
+                    Expected::First => first - second,
+                    _ => second - first,
+                };
+                let size = first.abs().max(second.abs());
+                assert!(better > 0.1 * size, "{name}, {task}: {first} and {second}");
+            }
+        }
+    }
+
+    /// Sum of the task rewards in a shot.
+    fn reward_of(task: &str, shot: Shot, len: u32) -> f64 {
+        let task = sim::tasks::task(task).unwrap();
+        let size = (task.spec)().action_size;
+        let mut rng = Rng::new(shot.seed.into(), Stream::Rollout, 0);
+        let mut act = |observation: &[f32]| match shot.player {
+            Player::Expert => task.expert.unwrap()(observation),
+            Player::Random => (0..size)
+                .map(|_| rng.uniform_in(-1.0, 1.0) as f32)
+                .collect(),
+        };
+        let played = rollout((task.make)().as_mut(), shot.seed.into(), &mut act).unwrap();
+        let window = shot.start as usize..(shot.start + len) as usize;
+        played.task_rewards[window].iter().sum()
+    }
+}
