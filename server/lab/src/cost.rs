@@ -165,6 +165,6 @@ mod tests {
             gigaflop(&config, &spec)
         };
         assert!(total("stair", "") > 1.1 * total("sac", ""));
-        assert!(total("stair", "quick") < 0.1 * total("stair", ""));
+        assert!(total("stair", "quick") < 0.2 * total("stair", ""));
     }
 }
