@@ -234,13 +234,14 @@ impl Episode {
         self.observe(now)
     }
 
-    /// Moves target, fingers and physics by one control step.
+    /// Moves target, fingers and physics with the task's object by one control step.
     ///
     /// # Errors
     /// Actions that do not fit leave the state unchanged; a world that left the finite numbers
     /// says so.
-    pub fn advance(&mut self, task: &str, action: &[f32]) -> Result<(), EnvError> {
-        let action = checked_action::<4>(task, action)?;
+    pub fn advance<S: Setup>(&mut self, setup: &S, action: &[f32]) -> Result<(), EnvError> {
+        let action = checked_action::<4>(S::NAME, action)?;
+        setup.meet_stops(&mut self.world.physics);
         self.hand.drive(&mut self.world.physics, action);
         self.n_steps += 1;
         let position_is_finite = |episode: &Self| {
@@ -252,7 +253,7 @@ impl Episode {
             return Ok(());
         }
         Err(EnvError::NotFinite {
-            task: task.into(),
+            task: S::NAME.into(),
             seed: self.seed,
             step: self.n_steps,
         })

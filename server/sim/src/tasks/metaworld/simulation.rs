@@ -87,8 +87,7 @@ impl<S: Setup + Send> Environment for Simulation<S> {
 
     fn step(&mut self, action: &[f32]) -> Result<Step, EnvError> {
         let State { episode, setup } = &mut self.state;
-        setup.meet_stops(&mut episode.world.physics);
-        episode.advance(S::NAME, action)?;
+        episode.advance(setup, action)?;
         let readings = self.readings();
         let (now, judgement) = (S::moment(&readings), S::judge(&readings));
         Ok(self.state.episode.finish_step(now, judgement))
