@@ -170,7 +170,7 @@ pub struct QueriesConfig {
     pub candidates_per_query: u32,
     /// Only the newest so many complete episodes are asked about; 100 in the released code.
     pub newest_episodes: usize,
-    /// A name of [`SAMPLERS`]; empty takes the method's own.
+    /// A name of [`SAMPLERS`](domain::sampler::SAMPLERS); empty takes the method's own.
     pub sampler: String,
     /// c_stage and c_state of STAIR's score.
     pub coefficients: StageCoefficients,
