@@ -177,7 +177,7 @@ pub struct Mover<'a> {
 /// How the ends of a joint give way.
 #[derive(Debug, Clone, Copy)]
 pub enum Stops {
-    /// Like MuJoCo's joint limits: see [`SoftStops`].
+    /// Like MuJoCo's joint limits: see `SoftStops`.
     Soft,
     /// Rapier's own, in its terms.
     Own(SpringCoefficients<f32>),
