@@ -268,3 +268,21 @@ fn an_experiment_that_does_not_fit_is_named_with_its_line() {
         &["rows.jsonl", "line 1"],
     );
 }
+
+#[test]
+fn a_reader_that_has_seen_enough_is_no_error() {
+    for arguments in [
+        &["tasks"][..],
+        &["experiment", "list"],
+        &["experiment", "check", "metaworld"],
+    ] {
+        let mut program = stair()
+            .args(arguments)
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("stair");
+        drop(program.stdout.take());
+        let status = program.wait().expect("it ends");
+        assert!(status.success(), "{arguments:?}: {status}");
+    }
+}

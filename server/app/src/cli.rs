@@ -71,6 +71,24 @@ impl std::fmt::Display for BadInput {
 
 impl std::error::Error for BadInput {}
 
+/// Writes a text to standard output. A reader that has seen enough, as `head` has, is no error.
+///
+/// # Errors
+/// When standard output cannot be written for another reason.
+fn say(text: &str) -> anyhow::Result<()> {
+    use std::io::{ErrorKind, Write as _};
+    let mut output = std::io::stdout().lock();
+    match output
+        .write_all(text.as_bytes())
+        .and_then(|()| output.flush())
+    {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+            Err(anyhow::Error::new(error).context("cannot write to standard output"))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// Parses, runs, and turns errors into a line on stderr and an exit code: 2 for bad input, 1
 /// for everything else.
 pub fn main() -> ExitCode {

@@ -19,6 +19,8 @@ pub struct EnvSpec {
     pub segment_len: u32,
     /// Seconds of simulated time in one control step.
     pub control_period_s: f64,
+    /// Whether an episode can succeed; else it only goes better or worse, as running does.
+    pub has_success: bool,
     /// Names of the true stages in order, empty where the task does not know them.
     pub stages: Vec<String>,
 }

@@ -23,6 +23,7 @@ mod stage_map;
 pub use curves::points as curve_points;
 pub use preferences::{PreferenceRow, Preferred};
 pub use rows::{CurveRow, rows_of_run};
+pub(crate) use seeds::LEAST_FOR_INTERVAL;
 pub use stage_gaps::points as stage_gap_points;
 
 /// A file of results, read: JSON Lines.

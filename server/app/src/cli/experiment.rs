@@ -79,7 +79,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     match args.command {
         Some(Command::Run(args)) => run::run(&args),
         Some(Command::Check(args)) => check::run(&args),
-        Some(Command::List(_)) => Ok(check::list()),
+        Some(Command::List(_)) => check::list(),
         Some(Command::Report(args)) => report::run(&args),
         None => without_simulation(&args),
     }

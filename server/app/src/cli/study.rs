@@ -8,7 +8,7 @@ use domain::query::Question;
 use lab::nearest::nearest;
 use lab::study::{READY, StudyFile};
 
-use super::BadInput;
+use super::{BadInput, say};
 
 /// Studies with people, from one file each
 #[derive(Debug, clap::Args)]
@@ -35,7 +35,7 @@ enum Action {
 /// [`BadInput`] names each mistake of a file with its line.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let Action::Check { file } = &args.action;
-    print!("{}", described(&read(file)?));
+    say(&described(&read(file)?))?;
     Ok(ExitCode::SUCCESS)
 }
 

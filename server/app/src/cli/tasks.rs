@@ -7,6 +7,8 @@ use lab::config::PRESETS;
 use lab::method::METHODS;
 use serde_json::json;
 
+use super::say;
+
 /// List tasks, methods, presets and teachers
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
@@ -21,13 +23,12 @@ pub struct Args {
 /// Runs the command.
 ///
 /// # Errors
-/// None today; the signature is that of every command.
-#[expect(clippy::unnecessary_wraps, reason = "every command has this signature")]
+/// Standard output that cannot be written.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     if args.json {
-        println!("{}", as_json());
+        say(&format!("{}\n", as_json()))?;
     } else {
-        print!("{}", as_text());
+        say(&as_text())?;
     }
     Ok(ExitCode::SUCCESS)
 }

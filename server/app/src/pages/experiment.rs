@@ -176,6 +176,7 @@ fn run_line(run: &Running) -> RunLine {
 
 fn left(seconds: f64) -> String {
     match seconds / 60.0 {
+        minutes if minutes < 1.5 => "about a minute left".into(),
         minutes if minutes < 90.0 => format!("about {minutes:.0} minutes left"),
         minutes if minutes < 48.0 * 60.0 => format!("about {:.0} hours left", minutes / 60.0),
         minutes => format!("about {:.0} days left", minutes / 1_440.0),
@@ -188,6 +189,7 @@ mod tests {
 
     #[test]
     fn the_time_left_is_told_in_a_unit_that_fits() {
+        assert_eq!(left(80.0), "about a minute left");
         assert_eq!(left(300.0), "about 5 minutes left");
         assert_eq!(left(7_200.0), "about 2 hours left");
         assert_eq!(left(259_200.0), "about 3 days left");

@@ -67,6 +67,23 @@ impl RunKey {
         let named = parts.into_iter().filter(|part| !part.is_empty());
         format!("{}.{}", named.collect::<Vec<_>>().join("."), self.seed)
     }
+
+    /// Setting and teacher as figures and tables show them; empty for the plain setting under
+    /// the oracle.
+    pub fn shown_setting(&self) -> String {
+        let parts = [self.setting.as_str(), self.shown_teacher()];
+        let parts: Vec<&str> = parts.into_iter().filter(|part| !part.is_empty()).collect();
+        parts.join(", ")
+    }
+
+    /// The teacher; empty for the oracle, who goes without saying.
+    pub fn shown_teacher(&self) -> &str {
+        if self.teacher == "oracle" {
+            ""
+        } else {
+            &self.teacher
+        }
+    }
 }
 
 fn in_a_name(c: char) -> char {

@@ -183,7 +183,7 @@ fn curves(
 
 fn evaluation_rows(runs: &[&RunResult]) -> Vec<CurveRow> {
     let of_run = |run: &&RunResult| {
-        let (key, setting) = (run.key.clone(), shown_setting(&run.key));
+        let (key, setting) = (run.key.clone(), run.key.shown_setting());
         let rows = run.evaluations.iter().map(move |e| CurveRow {
             task: key.task.clone(),
             method: key.method.clone(),
@@ -216,7 +216,7 @@ fn budget_rows(runs: &[&RunResult]) -> Vec<CurveRow> {
         task: run.key.task.clone(),
         method: run.key.method.clone(),
         seed: run.key.seed,
-        setting: shown_teacher(&run.key).to_owned(),
+        setting: run.key.shown_teacher().to_owned(),
         step: u64::from(run.end.budget),
         labels: run.end.budget,
         success_rate: score(run).value,
@@ -250,27 +250,12 @@ fn stage_gaps(files: &[RowFile]) -> Result<Vec<Artifact>, FigureError> {
     }
 }
 
-fn shown_teacher(key: &RunKey) -> &str {
-    if key.teacher == "oracle" {
-        ""
-    } else {
-        &key.teacher
-    }
-}
-
-/// Setting and teacher as one text; empty for the plain setting under the oracle.
-fn shown_setting(key: &RunKey) -> String {
-    let parts = [key.setting.as_str(), shown_teacher(key)];
-    let parts: Vec<&str> = parts.into_iter().filter(|part| !part.is_empty()).collect();
-    parts.join(", ")
-}
-
 impl Group {
     fn of(key: &RunKey) -> Self {
         Self {
             task: key.task.clone(),
             method: key.method.clone(),
-            setting: shown_setting(key),
+            setting: key.shown_setting(),
         }
     }
 }

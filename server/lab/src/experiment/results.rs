@@ -6,8 +6,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::grid::RunKey;
-use crate::config::{ConfigError, RunConfig};
-use crate::message::Event;
+use crate::config::{ConfigError, RunConfig, find_task};
+use crate::message::{Evaluation, Event, SessionOffered};
 use crate::method;
 
 mod folder;
@@ -30,9 +30,9 @@ pub struct Row {
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Content {
     /// The policy on held-out episodes.
-    Evaluation(EvaluationRow),
+    Evaluation(Evaluation),
     /// A session of queries as it was asked.
-    Session(SessionRow),
+    Session(SessionOffered),
     /// All rows of the run are above.
     Finished(RunRow),
     /// The run could not go on; it is tried again at the next start.
@@ -42,42 +42,6 @@ pub enum Content {
         /// Of the program.
         revision: String,
     },
-}
-
-/// The policy on held-out episodes.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct EvaluationRow {
-    /// Environment steps taken.
-    pub step: u64,
-    /// Answers so far, skips not counted.
-    pub labels: u32,
-    /// Share of episodes with success, [0, 1].
-    pub success_rate: f64,
-    /// Mean task return.
-    pub return_mean: f64,
-    /// Correlation of learned and task reward over the steps of some of the episodes.
-    pub reward_correlation: Option<f64>,
-}
-
-/// A session of queries as it was asked. Means; `None` where the method has no such number.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct SessionRow {
-    /// Environment steps taken.
-    pub step: u64,
-    /// From 0; the first is always random.
-    pub session: u32,
-    /// Queries asked.
-    pub n_queries: u32,
-    /// Of the chosen queries.
-    pub disagreement_chosen: Option<f64>,
-    /// Of all candidates.
-    pub disagreement_pool: Option<f64>,
-    /// Of the chosen queries, nats.
-    pub stage_gap_chosen: Option<f64>,
-    /// Of all candidates, nats.
-    pub stage_gap_pool: Option<f64>,
-    /// Share of chosen queries within one true stage, [0, 1].
-    pub same_stage_chosen: Option<f64>,
 }
 
 /// A run that is over, with all that comparing it needs.
@@ -137,23 +101,8 @@ pub fn rows_of_run(
             message: format!("line {}: {error}", n + 1),
         })?;
         match event {
-            Event::Evaluation(e) => rows.push(row(Content::Evaluation(EvaluationRow {
-                step: e.step,
-                labels: e.labels,
-                success_rate: e.success_rate,
-                return_mean: e.return_mean,
-                reward_correlation: e.reward_correlation,
-            }))),
-            Event::SessionOffered(s) => rows.push(row(Content::Session(SessionRow {
-                step: s.step,
-                session: s.session,
-                n_queries: s.n_queries,
-                disagreement_chosen: s.disagreement_chosen,
-                disagreement_pool: s.disagreement_pool,
-                stage_gap_chosen: s.stage_gap_chosen,
-                stage_gap_pool: s.stage_gap_pool,
-                same_stage_chosen: s.same_stage_chosen,
-            }))),
+            Event::Evaluation(e) => rows.push(row(Content::Evaluation(e))),
+            Event::SessionOffered(s) => rows.push(row(Content::Session(s))),
             Event::Finished(f) => {
                 let asks = method::find(&config.method)
                     .is_ok_and(|method| (method.build)(config).sampler.is_some());
@@ -163,7 +112,7 @@ pub fn rows_of_run(
                     budget: if asks { config.feedback.budget } else { 0 },
                     evaluation_episodes: config.evaluation.episodes,
                     evaluation_every: config.evaluation.every,
-                    has_success: has_success(&config.task),
+                    has_success: (find_task(&config.task)?.spec)().has_success,
                     weights: f.weights,
                     settings: fingerprint(config),
                     revision: history.revisions.join(" then "),
@@ -176,17 +125,6 @@ pub fn rows_of_run(
         }
     }
     Ok(None)
-}
-
-/// Whether a task is solved or not; the running and walking ones are done better or worse.
-fn has_success(task: &str) -> bool {
-    let moves = [
-        "walker-run",
-        "quadruped-walk",
-        "quadruped-run",
-        "cheetah-run",
-    ];
-    !moves.contains(&task)
 }
 
 /// Of resolved settings without their seed, so that the seeds of a group share it: 16
@@ -221,9 +159,9 @@ pub struct RunResult {
     /// Which.
     pub key: RunKey,
     /// In order of steps.
-    pub evaluations: Vec<EvaluationRow>,
+    pub evaluations: Vec<Evaluation>,
     /// In order of steps.
-    pub sessions: Vec<SessionRow>,
+    pub sessions: Vec<SessionOffered>,
     /// How it ended.
     pub end: RunRow,
 }

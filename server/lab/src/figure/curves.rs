@@ -2,10 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::plot::{Entry, Labels, Panel, Scale, Sheet, series};
-use super::seeds::{
-    BAND, Curve, add_line, draw_seeds, drawn_lines, in_order_of_appearance, quoted,
-};
+use super::seeds::{Curve, SeedSheet, add_line, drawn_lines, in_order_of_appearance, quoted};
 use super::{
     Center, CurveRow, FigureEntry, FigureError, Request, choose, make_center, read_rows,
     shown_method,
@@ -78,53 +75,25 @@ impl Plan {
 
 fn make(request: &Request) -> Result<String, FigureError> {
     let plan = Plan::of(request)?;
-    let (axes, tasks) = (plan.axes, &plan.tasks);
-    let key: Vec<Entry> = plan
-        .groups
-        .iter()
-        .enumerate()
-        .map(|(n, group)| Entry {
-            look: series(n),
-            name: key_name(group, &plan.rows),
-            has_line: true,
-        })
-        .collect();
-    let size = if tasks.len() == 1 {
-        (440.0, 250.0)
-    } else {
-        (270.0, 180.0)
+    let axes = plan.axes;
+    let name = |group| key_name(group, &plan.rows);
+    let sheet = SeedSheet {
+        groups: plan.groups.iter().map(name).collect(),
+        x: axes.x.0,
+        y: axes.y.0,
+        is_rate: axes.is_rate,
+        center: plan.center,
     };
-    let sheet = Sheet::new(tasks.len(), 3, size, key).noted(BAND);
-    let mut svg = sheet.start();
-    for (n, task) in tasks.iter().enumerate() {
-        let curves = plan.curves(task)?;
-        let curves: Vec<Vec<Curve>> = curves
-            .into_iter()
-            .map(|seeds| seeds.into_iter().map(|(_, curve)| curve).collect())
-            .collect();
-        let points = || curves.iter().flatten().flatten();
-        let panel = Panel {
-            frame: sheet.frame(n),
-            x: Scale::exact(
-                0.0,
-                points().fold(0.0, |greatest: f64, p| greatest.max(p.0)),
-            ),
-            y: if axes.is_rate {
-                Scale::exact(0.0, 100.0)
-            } else {
-                Scale::around(points().map(|p| p.1).chain([0.0]), 5)
-            },
-        };
-        let labels = Labels {
-            title: task,
-            x: axes.x.0,
-            y: axes.y.0,
-        };
-        panel.draw_axes(&mut svg, labels);
-        draw_seeds(&mut svg, &panel, &curves, plan.center);
-    }
+    let panel = |task: &String| {
+        let alone = |(_, curve)| curve;
+        let groups = plan.curves(task)?.into_iter();
+        let groups = groups.map(|seeds| seeds.into_iter().map(alone).collect());
+        Ok((task.clone(), groups.collect()))
+    };
+    let panels = plan.tasks.iter().map(panel);
+    let panels = panels.collect::<Result<Vec<_>, FigureError>>()?;
     let title = format!("{} over {}, by method", axes.y.0, axes.x.0.to_lowercase());
-    Ok(svg.finish(&title))
+    Ok(sheet.draw(&panels, &title))
 }
 
 /// Every point of the figure as CSV: those of each seed, of the centres, and of both ends of the

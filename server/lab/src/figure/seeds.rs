@@ -2,7 +2,7 @@
 
 use domain::agreement::Bootstrap;
 
-use super::plot::{Panel, Pen, Svg, series};
+use super::plot::{Entry, Labels, Panel, Pen, Scale, Sheet, Svg, series};
 
 /// Points from left to right.
 pub(super) type Curve = Vec<(f64, f64)>;
@@ -11,8 +11,62 @@ pub(super) type Curve = Vec<(f64, f64)>;
 pub(super) const BAND: &str =
     "Thin: each seed. Band: 95 % bootstrap interval over seeds, from three seeds on.";
 
-/// Seeds of one of which an interval would say nothing.
-const LEAST_FOR_BAND: usize = 3;
+/// Fewer seeds have no interval worth telling.
+pub(crate) const LEAST_FOR_INTERVAL: usize = 3;
+
+/// Panels of seeds side by side, with one key for all.
+pub(super) struct SeedSheet<'a> {
+    /// What each group is; the n-th looks like the n-th series.
+    pub(super) groups: Vec<String>,
+    /// Under each panel.
+    pub(super) x: &'a str,
+    /// Beside each panel.
+    pub(super) y: &'a str,
+    /// Whether the vertical axes go from 0 to 100 rather than as far as the points do.
+    pub(super) is_rate: bool,
+    /// How several seeds become one line.
+    pub(super) center: fn(&[f64]) -> f64,
+}
+
+impl SeedSheet<'_> {
+    /// Draws a panel for each title, with the curves of each group.
+    pub(super) fn draw(self, panels: &[(String, Vec<Vec<Curve>>)], title: &str) -> String {
+        let entry = |(n, name)| Entry {
+            look: series(n),
+            name,
+            has_line: true,
+        };
+        let key = self.groups.into_iter().enumerate().map(entry).collect();
+        let size = if panels.len() == 1 {
+            (440.0, 250.0)
+        } else {
+            (270.0, 180.0)
+        };
+        let sheet = Sheet::new(panels.len(), 3, size, key).noted(BAND);
+        let mut svg = sheet.start();
+        for (n, (title, curves)) in panels.iter().enumerate() {
+            let points = || curves.iter().flatten().flatten();
+            let furthest = points().fold(0.0, |greatest: f64, p| greatest.max(p.0));
+            let panel = Panel {
+                frame: sheet.frame(n),
+                x: Scale::exact(0.0, furthest),
+                y: if self.is_rate {
+                    Scale::exact(0.0, 100.0)
+                } else {
+                    Scale::around(points().map(|p| p.1).chain([0.0]), 5)
+                },
+            };
+            let labels = Labels {
+                title,
+                x: self.x,
+                y: self.y,
+            };
+            panel.draw_axes(&mut svg, labels);
+            draw_seeds(&mut svg, &panel, curves, self.center);
+        }
+        svg.finish(title)
+    }
+}
 
 /// Draws the seeds of each group, below all centres; the n-th group looks like the n-th series.
 pub(super) fn draw_seeds(
@@ -56,7 +110,7 @@ impl Line {
         for x in common_grid(seeds) {
             let values: Vec<f64> = seeds.iter().map(|seed| interpolate(seed, x)).collect();
             line.center.push((x, center(&values)));
-            if seeds.len() >= LEAST_FOR_BAND {
+            if seeds.len() >= LEAST_FOR_INTERVAL {
                 let found = Bootstrap::default().center(&values, center);
                 line.band
                     .extend(found.map(|e| (x, e.interval.lo, e.interval.hi)));

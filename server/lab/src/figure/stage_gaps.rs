@@ -5,12 +5,8 @@ use std::collections::BTreeMap;
 
 use domain::agreement::interquartile_mean;
 
-use super::plot::{Entry, Labels, Panel, Scale, Sheet, series};
-use super::seeds::{
-    BAND, Curve, add_line, draw_seeds, drawn_lines, in_order_of_appearance, quoted,
-};
+use super::seeds::{Curve, SeedSheet, add_line, drawn_lines, in_order_of_appearance, quoted};
 use super::{FigureEntry, FigureError, Request, read_rows, shown_method};
-use crate::experiment::grid::RunKey;
 use crate::experiment::results::{Content, Row};
 
 pub(super) const ENTRY: FigureEntry = FigureEntry {
@@ -49,7 +45,7 @@ impl Plan {
             if session.session == 0 {
                 continue; // random, before anything is known of stages
             }
-            let setting = shown_setting(&key);
+            let setting = key.shown_setting();
             for (is_chosen, gap) in [(true, chosen), (false, pool)] {
                 let group = (key.method.clone(), setting.clone(), is_chosen);
                 groups.push(group.clone());
@@ -81,66 +77,30 @@ impl Plan {
     }
 }
 
-fn shown_setting(key: &RunKey) -> String {
-    let teacher = if key.teacher == "oracle" {
-        ""
-    } else {
-        &key.teacher
-    };
-    let parts = [key.setting.as_str(), teacher];
-    let parts: Vec<&str> = parts.into_iter().filter(|part| !part.is_empty()).collect();
-    parts.join(", ")
-}
-
 fn make(request: &Request) -> Result<String, FigureError> {
     let plan = Plan::of(request)?;
-    let key = plan
-        .groups
-        .iter()
-        .enumerate()
-        .map(|(n, (method, setting, is_chosen))| {
-            let what = if *is_chosen { "chosen" } else { "candidates" };
-            let setting = if setting.is_empty() {
-                String::new()
-            } else {
-                format!(", {setting}")
-            };
-            Entry {
-                look: series(n),
-                name: format!("{}{setting}, {what}", shown_method(method)),
-                has_line: true,
-            }
-        });
-    let size = if plan.tasks.len() == 1 {
-        (440.0, 250.0)
-    } else {
-        (270.0, 180.0)
+    let name = |(method, setting, is_chosen): &Group| {
+        let what = if *is_chosen { "chosen" } else { "candidates" };
+        let parts = [&shown_method(method), setting.as_str(), what];
+        let parts: Vec<&str> = parts.into_iter().filter(|part| !part.is_empty()).collect();
+        parts.join(", ")
     };
-    let sheet = Sheet::new(plan.tasks.len(), 3, size, key.collect()).noted(BAND);
-    let mut svg = sheet.start();
-    for (n, (task, groups)) in plan.tasks.iter().enumerate() {
-        let curves: Vec<Vec<Curve>> = groups
-            .iter()
-            .map(|seeds| seeds.iter().map(|(_, curve)| curve.clone()).collect())
-            .collect();
-        let points = || curves.iter().flatten().flatten();
-        let panel = Panel {
-            frame: sheet.frame(n),
-            x: Scale::exact(
-                0.0,
-                points().fold(0.0, |greatest: f64, p| greatest.max(p.0)),
-            ),
-            y: Scale::around(points().map(|p| p.1).chain([0.0]), 5),
-        };
-        let labels = Labels {
-            title: task,
-            x: "Environment steps",
-            y: "Stage gap (nats)",
-        };
-        panel.draw_axes(&mut svg, labels);
-        draw_seeds(&mut svg, &panel, &curves, interquartile_mean);
-    }
-    Ok(svg.finish("Stage gap of chosen pairs and of all candidates over environment steps"))
+    let sheet = SeedSheet {
+        groups: plan.groups.iter().map(name).collect(),
+        x: "Environment steps",
+        y: "Stage gap (nats)",
+        is_rate: false,
+        center: interquartile_mean,
+    };
+    let panel = |(task, groups): &(String, Vec<Seeds>)| {
+        let alone = |seeds: &Seeds| seeds.iter().map(|(_, curve)| curve.clone()).collect();
+        (task.clone(), groups.iter().map(alone).collect::<Vec<_>>())
+    };
+    let panels: Vec<_> = plan.tasks.iter().map(panel).collect();
+    Ok(sheet.draw(
+        &panels,
+        "Stage gap of chosen pairs and of all candidates over environment steps",
+    ))
 }
 
 /// Every point of the figure as CSV.

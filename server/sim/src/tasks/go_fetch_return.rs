@@ -133,6 +133,7 @@ fn spec() -> EnvSpec {
         episode_len: EPISODE_LEN,
         segment_len: 12,
         control_period_s: f64::from(CONTROL_PERIOD_S),
+        has_success: true,
         stages: STAGES.map(String::from).to_vec(),
     }
 }

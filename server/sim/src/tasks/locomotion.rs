@@ -50,6 +50,7 @@ impl Sizes {
             episode_len: EPISODE_LEN,
             segment_len: SEGMENT_LEN,
             control_period_s: self.control_period_s,
+            has_success: false,
             stages: Vec::new(),
         }
     }

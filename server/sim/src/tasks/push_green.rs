@@ -280,6 +280,7 @@ fn spec() -> EnvSpec {
         episode_len: EPISODE_LEN,
         segment_len: 50,
         control_period_s: f64::from(CONTROL_PERIOD_S),
+        has_success: true,
         stages: Vec::new(),
     }
 }

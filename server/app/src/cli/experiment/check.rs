@@ -8,6 +8,7 @@ use lab::cost::{core_time_here, on_cores};
 use lab::experiment::grid::{self, Grid, GridRun, SHIPPED};
 
 use super::{Chosen, in_words};
+use crate::cli::say;
 
 /// The machine for which costs are told.
 const CORES: usize = 2;
@@ -28,32 +29,38 @@ pub(super) struct ListArgs {}
 
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let chosen = Chosen::open(&args.file, args.small)?;
-    println!("{}\n{}\n", chosen.grid.title, chosen.grid.about);
-    for run in &chosen.grid.runs {
-        println!(
-            "{:60} {:>9} steps  {:>6} answers  {:>9}",
+    let line = |run: &GridRun| {
+        format!(
+            "{:60} {:>9} steps  {:>6} answers  {:>9}\n",
             run.key.name(),
             run.config.training.total_steps,
             run.config.feedback.budget,
             in_words(time(run))
-        );
-    }
-    println!("\n{}", cost(&chosen.grid));
+        )
+    };
+    let grid = &chosen.grid;
+    let lines: String = grid.runs.iter().map(line).collect();
+    let (title, about) = (&grid.title, &grid.about);
+    say(&format!("{title}\n{about}\n\n{lines}\n{}\n", cost(grid)))?;
     Ok(ExitCode::SUCCESS)
 }
 
-pub(super) fn list() -> ExitCode {
+pub(super) fn list() -> anyhow::Result<ExitCode> {
     for shipped in SHIPPED {
         let resolved = |is_small| grid::resolve(shipped.source(), is_small);
         let (Ok(whole), Ok(small)) = (resolved(false), resolved(true)) else {
             continue; // a test resolves them all
         };
-        println!("{}: {}", shipped.name, whole.title);
-        println!("  {}", whole.about.replace('\n', "\n  "));
-        println!("  {}", cost(&whole));
-        println!("  --small: {}\n", cost(&small));
+        say(&format!(
+            "{}: {}\n  {}\n  {}\n  --small: {}\n\n",
+            shipped.name,
+            whole.title,
+            whole.about.replace('\n', "\n  "),
+            cost(&whole),
+            cost(&small)
+        ))?;
     }
-    ExitCode::SUCCESS
+    Ok(ExitCode::SUCCESS)
 }
 
 /// `12 runs, about 3 h on 2 cores like this machine's`

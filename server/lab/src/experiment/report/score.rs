@@ -2,7 +2,8 @@
 
 use domain::agreement::mean;
 
-use crate::experiment::results::{EvaluationRow, RunResult};
+use crate::experiment::results::RunResult;
+use crate::message::Evaluation;
 
 /// Evaluations at the end of which the mean is a run's score.
 const N_LAST: usize = 10;
@@ -96,7 +97,7 @@ fn mean_of(values: impl Iterator<Item = Option<f64>>) -> Option<f64> {
     (!values.is_empty()).then(|| mean(&values))
 }
 
-fn value(run: &RunResult, evaluation: &EvaluationRow) -> f64 {
+fn value(run: &RunResult, evaluation: &Evaluation) -> f64 {
     if run.end.has_success {
         evaluation.success_rate
     } else {

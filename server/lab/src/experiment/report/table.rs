@@ -5,6 +5,7 @@ use domain::agreement::{Bootstrap, Estimate, interquartile_mean};
 use super::comparable::{counted, revisions};
 use super::score::{Reached, area, gap_ratio, reached, same_stage, score};
 use super::{Group, RunResult, Runs};
+use crate::figure::LEAST_FOR_INTERVAL;
 use crate::method::METHODS;
 
 /// Shares of success of which the tables say when they were reached.
@@ -54,7 +55,7 @@ fn members<'a>(runs: &'a Runs, group: &Group) -> Vec<&'a RunResult> {
 pub(super) fn markdown(runs: &Runs) -> String {
     let mut text = String::from(
         "# Report\n\nA run's score is the mean of its last ten evaluations, each of the same held-out episodes. \
-         Over seeds: interquartile mean with its 95 % bootstrap interval. Area: mean height of the curve. \
+         Over seeds: interquartile mean, from three seeds on with its 95 % bootstrap interval. Area: mean height of the curve. \
          Reached: the first evaluation with that success, median over the seeds that got there.\n",
     );
     let groups = groups(runs);
@@ -205,8 +206,8 @@ fn difference(pairs: &[(f64, f64)], is_rate: bool) -> String {
     Bootstrap::default().paired_difference(pairs).map_or_else(
         || "–".into(),
         |found| {
-            let told = estimate(&found, is_rate);
-            let is_sure = pairs.len() > 2 && !found.interval.contains(0.0);
+            let told = told_of(pairs.len(), &found, is_rate);
+            let is_sure = pairs.len() >= LEAST_FOR_INTERVAL && !found.interval.contains(0.0);
             if is_sure { format!("**{told}**") } else { told }
         },
     )
@@ -376,7 +377,19 @@ pub(super) fn csv(runs: &Runs) -> String {
 
 fn center(values: &[f64], is_rate: bool) -> String {
     let found = Bootstrap::default().center(values, interquartile_mean);
-    found.map_or_else(|| "–".into(), |found| estimate(&found, is_rate))
+    found.map_or_else(
+        || "–".into(),
+        |found| told_of(values.len(), &found, is_rate),
+    )
+}
+
+/// With its interval where there are seeds enough for one.
+fn told_of(n_seeds: usize, found: &Estimate, is_rate: bool) -> String {
+    if n_seeds < LEAST_FOR_INTERVAL {
+        number(found.value, is_rate)
+    } else {
+        estimate(found, is_rate)
+    }
 }
 
 fn estimate(found: &Estimate, is_rate: bool) -> String {

@@ -1,5 +1,6 @@
 use super::*;
-use crate::experiment::results::{Content, EvaluationRow, Row, RunRow, SessionRow};
+use crate::experiment::results::{Content, Row, RunRow};
+use crate::message::{Evaluation, SessionOffered};
 
 /// A run with these evaluations at every thousandth step, each after ten more answers.
 struct Told {
@@ -50,7 +51,7 @@ impl Told {
     }
 
     fn rows(&self, end: RunRow) -> String {
-        let mut contents = vec![Content::Session(SessionRow {
+        let mut contents = vec![Content::Session(SessionOffered {
             step: 1_500,
             session: 1,
             n_queries: 5,
@@ -61,11 +62,13 @@ impl Told {
             same_stage_chosen: Some(self.same_stage),
         })];
         contents.extend(self.success.iter().enumerate().map(|(n, success)| {
-            Content::Evaluation(EvaluationRow {
+            Content::Evaluation(Evaluation {
                 step: 1_000 * (n as u64 + 1),
                 labels: 10 * (n as u32 + 1),
                 success_rate: *success,
+                episodes: 50,
                 return_mean: 7.0,
+                return_std: 0.0,
                 reward_correlation: None,
             })
         }));
