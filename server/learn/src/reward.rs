@@ -48,6 +48,14 @@ pub struct RewardConfig {
     /// of 1. Without it, few answers that are passed over often saturate the tanh, and later
     /// answers can no longer move the reward there. B-Pref's `label_margin`.
     pub label_margin: f64,
+    /// Divides the difference of two segments' sums in P = σ(Δ / temperature), above 0.
+    ///
+    /// At 1 a preference between segments of 50 steps is certain once they differ by a tenth a
+    /// step, and nothing drives learned rewards further apart; a temperature in the order of the
+    /// segment's length makes them spread over the whole of (−1, 1).
+    ///
+    /// Differs from the paper: its Eq. 1 has none, which is 1.
+    pub temperature: f64,
     /// Standard deviation that learned rewards have over the whole replay, their mean being 0;
     /// relabelling sees to it. 0 leaves them as the members say, as the released code does.
     ///
@@ -69,6 +77,7 @@ impl Default for RewardConfig {
             max_epochs: 10,
             stop_accuracy: 0.97,
             label_margin: 0.0,
+            temperature: 1.0,
             normalized_std: 0.0,
             precision: Precision::F32,
         }
@@ -270,7 +279,7 @@ impl RewardEnsemble {
     /// right often enough or the passes are used up.
     ///
     /// Each member sees the preferences in its own order. The loss is the cross-entropy of
-    /// P(second ≻ first) = σ(Σ r(second) − Σ r(first)) to 0, 1 (less the label margin), or ½ for
+    /// P(second ≻ first) = σ((Σ r(second) − Σ r(first)) / temperature) to 0, 1 (less the label margin), or ½ for
     /// equal, mean over a minibatch, summed over members.
     ///
     /// Source: BPref's `train_soft_reward` without smoothing. Differs from the code: equal
@@ -367,7 +376,8 @@ impl RewardEnsemble {
                 .flat_map(|member| &examples[own(member)])
                 .copied()
                 .collect();
-            let chunk = Chunk::gather(replay, pairs.iter().map(|e| &e.query), longest);
+            let queries = pairs.iter().map(|e| &e.query);
+            let chunk = self.chunk(replay, queries, longest);
             let input = self
                 .input(&chunk.rows)
                 .view([n_members as i64, -1, self.columns]);
@@ -400,7 +410,7 @@ impl RewardEnsemble {
             let end = n.min(start + pairs_at_once);
             let own = |member: usize| member * n + start..member * n + end;
             let pairs = (0..self.config.members).flat_map(|member| &queries[own(member)]);
-            let chunk = Chunk::gather(replay, pairs, longest);
+            let chunk = self.chunk(replay, pairs, longest);
             let input =
                 self.input(&chunk.rows)
                     .view([self.config.members as i64, -1, self.columns]);
@@ -477,7 +487,7 @@ impl RewardEnsemble {
         let mut probabilities = vec![Vec::with_capacity(queries.len()); self.config.members];
         let longest = queries.iter().map(longest).max().unwrap_or(1);
         for queries in queries.chunks((CHUNK_ROWS / (2 * longest)).max(1)) {
-            let chunk = Chunk::gather(replay, queries.iter(), longest);
+            let chunk = self.chunk(replay, queries.iter(), longest);
             let reward = to_vec(&self.net.forward(&self.input(&chunk.rows)).tanh());
             let own = reward.len() / self.config.members;
             for (member, reward) in probabilities.iter_mut().zip(reward.chunks(own)) {
@@ -520,6 +530,15 @@ impl RewardEnsemble {
             rewards: to_vec(&mean),
             disagreements: to_vec(&std),
         }
+    }
+
+    fn chunk<'a>(
+        &self,
+        replay: &Replay,
+        queries: impl Iterator<Item = &'a Query>,
+        longest: usize,
+    ) -> Chunk {
+        Chunk::gather(replay, queries, longest, self.config.temperature)
     }
 
     fn input(&self, rows: &[f32]) -> Tensor {
@@ -566,6 +585,7 @@ struct Chunk {
     /// Steps of each segment.
     lens: Vec<usize>,
     longest: usize,
+    temperature: f64,
 }
 
 impl Chunk {
@@ -573,6 +593,7 @@ impl Chunk {
         replay: &Replay,
         queries: impl Iterator<Item = &'a Query>,
         longest: usize,
+        temperature: f64,
     ) -> Self {
         let shape = replay.shape();
         let segment_len = longest * (shape.observation + shape.action);
@@ -586,10 +607,11 @@ impl Chunk {
             rows,
             lens,
             longest,
+            temperature,
         }
     }
 
-    /// Σ r(second) − Σ r(first) of each pair, from one number a row.
+    /// (Σ r(second) − Σ r(first)) / temperature of each pair, from one number a row.
     fn logits(&self, rewards: &[f32]) -> Vec<f64> {
         let sum =
             |(reward, &len): (&[f32], &usize)| reward[..len].iter().copied().map(f64::from).sum();
@@ -598,7 +620,8 @@ impl Chunk {
             .zip(&self.lens)
             .map(sum)
             .collect();
-        sums.chunks_exact(2).map(|pair| pair[1] - pair[0]).collect()
+        let logit = |pair: &[f64]| (pair[1] - pair[0]) / self.temperature;
+        sums.chunks_exact(2).map(logit).collect()
     }
 
     /// What each row's reward adds to the loss, from what each pair's logit does.
@@ -606,7 +629,7 @@ impl Chunk {
         let mut rows = vec![0.0; self.lens.len() * self.longest];
         for (index, (rows, &len)) in rows.chunks_mut(self.longest).zip(&self.lens).enumerate() {
             let sign = if index % 2 == 0 { -1.0 } else { 1.0 };
-            rows[..len].fill((sign * slopes[index / 2]) as f32);
+            rows[..len].fill((sign * slopes[index / 2] / self.temperature) as f32);
         }
         rows
     }

@@ -142,6 +142,10 @@ impl RunConfig {
         if !(std >= 0.0 && std.is_finite()) {
             return out("reward.normalized_std", &std, "a number from 0 on");
         }
+        let temperature = self.reward.temperature;
+        if !(temperature > 0.0 && temperature.is_finite()) {
+            return out("reward.temperature", &temperature, "a number above 0");
+        }
         if !(1..=64).contains(&self.reward.members) {
             return out("reward.members", &self.reward.members, "from 1 to 64");
         }
