@@ -45,6 +45,8 @@ pub enum Stream {
     WarmStart = 18,
     /// Pairs that nobody is asked about.
     Unlabeled = 19,
+    /// Segments and pairs of a study, and in which order a labeler meets them.
+    Study = 20,
     /// Tests.
     Test = 99,
 }

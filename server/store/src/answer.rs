@@ -17,6 +17,7 @@ use crate::query::{QueryId, which, word};
 use crate::run::RunId;
 use crate::secret::random_name;
 use crate::store::Store;
+use crate::study::{check_open, turn_role};
 use crate::time::now_ms;
 use crate::writer::Transaction;
 
@@ -148,7 +149,8 @@ impl Store {
     /// # Errors
     /// [`StoreError::Missing`], [`StoreError::NotYours`], [`StoreError::WrongQuestion`],
     /// [`StoreError::NoReason`], [`StoreError::Different`], [`StoreError::NotSupersedable`];
-    /// [`StoreError::Taken`], where the answer is kept aside.
+    /// [`StoreError::Taken`] and, for a study that is closed, [`StoreError::StudyState`], where
+    /// the answer is kept aside.
     pub async fn answer(
         &self,
         lease: &str,
@@ -156,32 +158,32 @@ impl Store {
         answer: NewAnswer,
     ) -> Result<StoredAnswer, StoreError> {
         let lease = lease.to_owned();
-        let stored = self
-            .write(move |t| {
-                Box::pin(async move {
-                    let leased = find_lease(t, &lease, labeler).await?;
-                    let pressed = Pressed::parse(question(&leased.kind), &answer.pressed)?;
-                    let has_reason = answer
-                        .reason
-                        .as_ref()
-                        .is_some_and(|reason| !reason.trim().is_empty());
-                    if pressed.word() == "skip" && !has_reason {
-                        return Err(StoreError::NoReason);
-                    }
-                    if let Some(stored) = find_sent_before(t, &leased, pressed, &answer).await? {
-                        return Ok(Some(stored));
-                    }
-                    if leased.state == "taken" && is_elsewhere(t, &leased).await? {
-                        keep_aside(t, &leased, labeler, &answer).await?;
-                        return Ok(None);
-                    }
-                    insert(t, &leased, labeler, pressed, &answer)
-                        .await
-                        .map(Some)
-                })
+        self.write(move |t| {
+            Box::pin(async move {
+                let leased = find_lease(t, &lease, labeler).await?;
+                let pressed = Pressed::parse(question(&leased.kind), &answer.pressed)?;
+                let has_reason = answer
+                    .reason
+                    .as_ref()
+                    .is_some_and(|reason| !reason.trim().is_empty());
+                if pressed.word() == "skip" && !has_reason {
+                    return Err(StoreError::NoReason);
+                }
+                if let Some(stored) = find_sent_before(t, &leased, pressed, &answer).await? {
+                    return Ok(Ok(stored));
+                }
+                if let Err(closed) = check_open(t, leased.run, labeler).await {
+                    keep_aside(t, &leased, labeler, &answer).await?;
+                    return Ok(Err(closed));
+                }
+                if leased.state == "taken" && is_elsewhere(t, &leased).await? {
+                    keep_aside(t, &leased, labeler, &answer).await?;
+                    return Ok(Err(StoreError::Taken));
+                }
+                insert(t, &leased, labeler, pressed, &answer).await.map(Ok)
             })
-            .await?;
-        stored.ok_or(StoreError::Taken)
+        })
+        .await?
     }
 
     /// Preferences and skips with a number above `after`, in order: what a run takes in.
@@ -463,6 +465,11 @@ async fn close_question(
         .bind(&leased.id)
         .execute(&mut *t.connection)
         .await?;
+    if let Some(role) = turn_role(t, leased.query).await? {
+        // A study's pairs are fixed: a skip is an answer about a pair, and nothing replaces it.
+        let is_one_more = role != "practice" && answer.supersedes.is_none();
+        return count(t, leased.run, i64::from(is_one_more)).await;
+    }
     if leased.kind != "preference" {
         return Ok(());
     }
@@ -477,11 +484,8 @@ async fn close_question(
                 != "skip"
         }
     };
-    sqlx::query("update run set n_labels = n_labels + ? where id = ?")
-        .bind(i64::from(!is_skip) - i64::from(was_counted))
-        .bind(leased.run.0)
-        .execute(&mut *t.connection)
-        .await?;
+    let more = i64::from(!is_skip) - i64::from(was_counted);
+    count(t, leased.run, more).await?;
     let (from, to) = if is_skip {
         ("open", "withdrawn")
     } else {
@@ -495,6 +499,15 @@ async fn close_question(
     .bind(from)
     .execute(&mut *t.connection)
     .await?;
+    Ok(())
+}
+
+async fn count(t: &mut Transaction<'_>, run: RunId, more: i64) -> Result<(), StoreError> {
+    sqlx::query("update run set n_labels = n_labels + ? where id = ?")
+        .bind(more)
+        .bind(run.0)
+        .execute(&mut *t.connection)
+        .await?;
     Ok(())
 }
 

@@ -81,6 +81,37 @@ impl Store {
             Err(_) => Err(StoreError::Closed),
         }
     }
+
+    /// Removes bytes that no row names any more. What cannot be removed stays and does no harm.
+    pub(crate) async fn remove_bytes(&self, sha256: &str) {
+        let path = path_of(self.folder(), sha256);
+        let removed = tokio::task::spawn_blocking(move || std::fs::remove_file(path)).await;
+        if let Ok(Err(error)) = removed {
+            tracing::warn!("the bytes of clip {sha256} are unused and cannot be removed: {error}");
+        }
+    }
+}
+
+/// Removes the rows of those clips that nothing shows; returns which they were.
+pub(crate) async fn forget_unused(
+    t: &mut Transaction<'_>,
+    clips: &[String],
+) -> Result<Vec<String>, StoreError> {
+    let mut forgotten = Vec::new();
+    for sha256 in clips {
+        let removed = sqlx::query(
+            "delete from clip where sha256 = ?1
+                and not exists (select 1 from query where first_clip = ?1 or second_clip = ?1)
+                and not exists (select 1 from demonstration where clip = ?1)",
+        )
+        .bind(sha256)
+        .execute(&mut *t.connection)
+        .await?;
+        if removed.rows_affected() > 0 {
+            forgotten.push(sha256.clone());
+        }
+    }
+    Ok(forgotten)
 }
 
 pub(crate) async fn add_row(t: &mut Transaction<'_>, clip: &ClipRow) -> Result<(), StoreError> {

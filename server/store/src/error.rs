@@ -114,9 +114,52 @@ pub enum StoreError {
     /// The answer that is to be superseded is not the lease's present answer.
     #[error("answer {0} is not an answer of this lease")]
     NotSupersedable(String),
+    /// The study is not in the state for this.
+    #[error("the study is {state}: {told}")]
+    StudyState {
+        /// `preparing`, `ready`, `open`, `closed` or `failed`.
+        state: String,
+        /// What that means for what was asked.
+        told: &'static str,
+    },
+    /// A study has no place left to give.
+    #[error(
+        "every pair is answered by {most} labelers, and {invited} are invited already; no more can be"
+    )]
+    NoSeatLeft {
+        /// Seats at most.
+        most: u32,
+        /// Seats that are given.
+        invited: u32,
+    },
+    /// A link into a study that does not work, or no longer.
+    #[error("{0}")]
+    Link(LinkTrouble),
     /// Somebody else took the lease; the answer is kept aside.
     #[error("the lease ran out and somebody else has the question now; the answer is kept aside")]
     Taken,
+}
+
+/// What is wrong with a link into a study.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum LinkTrouble {
+    /// Nobody was ever given it.
+    #[error("this link is not one that was given out; it may be cut off")]
+    Unknown,
+    /// Somebody has entered by it.
+    #[error(
+        "somebody has begun by this link already; go on in the browser where you began, or with your return code"
+    )]
+    Used,
+    /// It is too late.
+    #[error("this link has run out; ask whoever sent it for a new one")]
+    Expired,
+    /// The study takes no answers yet.
+    #[error("this study has not begun yet; try again later")]
+    NotYet,
+    /// The study takes no answers any more.
+    #[error("this study is closed; thank you for wanting to take part")]
+    Closed,
 }
 
 impl StoreError {

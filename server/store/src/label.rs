@@ -2,10 +2,12 @@
 
 use serde::Serialize;
 use sqlx::Row as _;
+use sqlx::sqlite::SqliteRow;
 
 use crate::error::StoreError;
 use crate::run::RunId;
 use crate::store::Store;
+use crate::study::StudyId;
 use crate::time::rfc3339;
 
 /// One answer with all that belongs to it; the columns of every export, in this order.
@@ -17,8 +19,9 @@ pub struct Label {
     pub run_id: i64,
     /// Task.
     pub task: String,
-    /// Method that chose the query.
-    pub method: String,
+    /// Method that chose the query; `None` for pairs that no method chose, and in a study that
+    /// is not closed.
+    pub method: Option<String>,
     /// Seed of the run.
     pub seed: i64,
     /// `preference` or `same_stage`.
@@ -81,6 +84,23 @@ pub struct Label {
     pub input: Option<String>,
     /// RFC 3339.
     pub stored_at: String,
+    /// The study, where it was asked in one.
+    pub study_id: Option<i64>,
+    /// The study's pair: the same for every labeler.
+    pub item_id: Option<i64>,
+    /// `counted`, `practice`, `check` or `repeat`, in a study.
+    pub role: Option<String>,
+    /// The right answer where it is known: `first`, `second`, `equal`, `same`, `different`.
+    pub expects: Option<String>,
+}
+
+/// Whose answers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LabelsOf {
+    /// Of one run.
+    Run(RunId),
+    /// Of all labelers of a study.
+    Study(StudyId),
 }
 
 impl Label {
@@ -121,7 +141,75 @@ impl Label {
         "dropped_frames",
         "input",
         "stored_at",
+        "study_id",
+        "item_id",
+        "role",
+        "expects",
     ];
+}
+
+const LABELS: &str = "select answer.*, run.task, run.seed, query.id as query_id, query.session, query.position,
+        iif(run.study_id is null, run.method, iif(study.state = 'closed', study_item.method, null)) as method,
+        labeler.name as labeler, query.first_clip, query.second_clip, query.disagreement, query.stage_gap,
+        a.episode as first_episode, a.start as first_start, a.len as segment_len,
+        b.episode as second_episode, b.start as second_start,
+        not exists (select 1 from answer as later where later.supersedes = answer.id) as is_current,
+        run.study_id, study_turn.item_id, study_turn.role, study_item.expects
+    from answer
+    join run on run.id = answer.run_id
+    join question on question.id = answer.question_id
+    join query on query.id = question.query_id
+    join query_segment as a on a.query_id = query.id and a.which = 'first'
+    join query_segment as b on b.query_id = query.id and b.which = 'second'
+    join labeler on labeler.id = answer.labeler_id
+    left join study on study.id = run.study_id
+    left join study_turn on study_turn.query_id = query.id
+    left join study_item on study_item.id = study_turn.item_id
+    where (answer.run_id = ?1 or run.study_id = ?2)
+    order by answer.stored_at_ms, answer.run_id, answer.kind, answer.sequence limit ?3 offset ?4";
+
+fn read(row: &SqliteRow) -> Result<Label, StoreError> {
+    Ok(Label {
+        answer_id: row.try_get("id")?,
+        run_id: row.try_get("run_id")?,
+        task: row.try_get("task")?,
+        method: row.try_get("method")?,
+        seed: row.try_get("seed")?,
+        question: row.try_get("kind")?,
+        sequence: row.try_get("sequence")?,
+        query_id: row.try_get("query_id")?,
+        session: row.try_get("session")?,
+        position: row.try_get("position")?,
+        labeler: row.try_get("labeler")?,
+        pressed: row.try_get("pressed")?,
+        meaning: row.try_get("meaning")?,
+        left_is: row.try_get("left_is")?,
+        reason: row.try_get("reason")?,
+        supersedes: row.try_get("supersedes")?,
+        is_current: row.try_get("is_current")?,
+        first_episode: row.try_get("first_episode")?,
+        first_start: row.try_get("first_start")?,
+        first_clip: row.try_get("first_clip")?,
+        second_episode: row.try_get("second_episode")?,
+        second_start: row.try_get("second_start")?,
+        second_clip: row.try_get("second_clip")?,
+        segment_len: row.try_get("segment_len")?,
+        disagreement: row.try_get("disagreement")?,
+        stage_gap: row.try_get("stage_gap")?,
+        guidance_sha256: row.try_get("guidance_sha256")?,
+        visible_ms: row.try_get("visible_ms")?,
+        hidden_ms: row.try_get("hidden_ms")?,
+        loops: row.try_get("loops")?,
+        seeks: row.try_get("seeks")?,
+        speed: row.try_get("speed")?,
+        dropped_frames: row.try_get("dropped_frames")?,
+        input: row.try_get("input")?,
+        stored_at: rfc3339(row.try_get("stored_at_ms")?),
+        study_id: row.try_get("study_id")?,
+        item_id: row.try_get("item_id")?,
+        role: row.try_get("role")?,
+        expects: row.try_get("expects")?,
+    })
 }
 
 /// An answered query to look at again.
@@ -142,70 +230,30 @@ pub struct AnsweredPair {
 }
 
 impl Store {
-    /// All answers of a run, in the order in which they were stored.
+    /// Answers in the order in which they were stored, a page of them.
+    ///
+    /// * `after` – the page begins behind this many
     ///
     /// # Errors
     /// When the database cannot be read.
-    pub async fn labels(&self, run: RunId) -> Result<Vec<Label>, StoreError> {
-        let rows = sqlx::query(
-            "select answer.*, run.task, run.method, run.seed, query.id as query_id, query.session, query.position,
-                labeler.name as labeler, query.first_clip, query.second_clip, query.disagreement, query.stage_gap,
-                a.episode as first_episode, a.start as first_start, a.len as segment_len,
-                b.episode as second_episode, b.start as second_start,
-                not exists (select 1 from answer as later where later.supersedes = answer.id) as is_current
-             from answer
-             join run on run.id = answer.run_id
-             join question on question.id = answer.question_id
-             join query on query.id = question.query_id
-             join query_segment as a on a.query_id = query.id and a.which = 'first'
-             join query_segment as b on b.query_id = query.id and b.which = 'second'
-             join labeler on labeler.id = answer.labeler_id
-             where answer.run_id = ? order by answer.stored_at_ms, answer.kind, answer.sequence",
-        )
-        .bind(run.0)
-        .fetch_all(self.readers())
-        .await?;
-        rows.iter()
-            .map(|row| {
-                Ok(Label {
-                    answer_id: row.try_get("id")?,
-                    run_id: row.try_get("run_id")?,
-                    task: row.try_get("task")?,
-                    method: row.try_get("method")?,
-                    seed: row.try_get("seed")?,
-                    question: row.try_get("kind")?,
-                    sequence: row.try_get("sequence")?,
-                    query_id: row.try_get("query_id")?,
-                    session: row.try_get("session")?,
-                    position: row.try_get("position")?,
-                    labeler: row.try_get("labeler")?,
-                    pressed: row.try_get("pressed")?,
-                    meaning: row.try_get("meaning")?,
-                    left_is: row.try_get("left_is")?,
-                    reason: row.try_get("reason")?,
-                    supersedes: row.try_get("supersedes")?,
-                    is_current: row.try_get("is_current")?,
-                    first_episode: row.try_get("first_episode")?,
-                    first_start: row.try_get("first_start")?,
-                    first_clip: row.try_get("first_clip")?,
-                    second_episode: row.try_get("second_episode")?,
-                    second_start: row.try_get("second_start")?,
-                    second_clip: row.try_get("second_clip")?,
-                    segment_len: row.try_get("segment_len")?,
-                    disagreement: row.try_get("disagreement")?,
-                    stage_gap: row.try_get("stage_gap")?,
-                    guidance_sha256: row.try_get("guidance_sha256")?,
-                    visible_ms: row.try_get("visible_ms")?,
-                    hidden_ms: row.try_get("hidden_ms")?,
-                    loops: row.try_get("loops")?,
-                    seeks: row.try_get("seeks")?,
-                    speed: row.try_get("speed")?,
-                    dropped_frames: row.try_get("dropped_frames")?,
-                    input: row.try_get("input")?,
-                    stored_at: rfc3339(row.try_get("stored_at_ms")?),
-                })
-            })
-            .collect()
+    pub async fn labels(
+        &self,
+        of: LabelsOf,
+        after: u32,
+        limit: u32,
+    ) -> Result<Vec<Label>, StoreError> {
+        let (run, study) = match of {
+            LabelsOf::Run(run) => (Some(run.0), None),
+            LabelsOf::Study(study) => (None, Some(study.0)),
+        };
+        let rows = sqlx::query(LABELS)
+            .bind(run)
+            .bind(study)
+            .bind(limit)
+            .bind(after)
+            .fetch_all(self.readers())
+            .await?;
+        rows.iter().map(read).collect()
     }
 
     /// The newest answered queries that were shown as clips, newest first.

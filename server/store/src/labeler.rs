@@ -36,23 +36,35 @@ impl Store {
     pub async fn sign_in(&self, name: &str) -> Result<(Labeler, Secret), StoreError> {
         let name = name.trim().to_owned();
         let secret = Secret::random()?;
-        let hash = secret.hash();
+        let browser = secret.clone();
         let labeler = self
             .write(move |t| {
                 Box::pin(async move {
                     let id = find_or_add(t, &name).await?;
-                    sqlx::query("insert into token (hash, kind, labeler_id, created_at_ms) values (?, 'labeler', ?, ?)")
-                        .bind(hash)
-                        .bind(id.0)
-                        .bind(now_ms())
-                        .execute(&mut *t.connection)
-                        .await?;
+                    admit(t, id, &browser).await?;
                     Ok(Labeler { id, name })
                 })
             })
             .await?;
         Ok((labeler, secret))
     }
+}
+
+/// Makes a secret that of one browser of a labeler.
+pub(crate) async fn admit(
+    t: &mut Transaction<'_>,
+    labeler: LabelerId,
+    browser: &Secret,
+) -> Result<(), StoreError> {
+    sqlx::query(
+        "insert into token (hash, kind, labeler_id, created_at_ms) values (?, 'labeler', ?, ?)",
+    )
+    .bind(browser.hash())
+    .bind(labeler.0)
+    .bind(now_ms())
+    .execute(&mut *t.connection)
+    .await?;
+    Ok(())
 }
 
 pub(crate) async fn find_or_add(

@@ -11,6 +11,7 @@ use crate::query::{QueryId, which, word};
 use crate::run::RunId;
 use crate::secret::{coin, random_name};
 use crate::store::Store;
+use crate::study::{check_open, practice};
 use crate::writer::Transaction;
 
 /// How long a question stays with a labeler who is not heard of.
@@ -44,8 +45,19 @@ pub struct Lease {
     pub left: Option<LeaseClip>,
     /// The right clip.
     pub right: Option<LeaseClip>,
+    /// The right answer, where this is practice.
+    pub practice: Option<Practice>,
     /// Milliseconds since 1970.
     pub expires_at_ms: i64,
+}
+
+/// What a labeler who practises is told after the answer.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Practice {
+    /// `left`, `right`, `equal`, `same` or `different`: with the sides of the lease.
+    pub expects: String,
+    /// Why.
+    pub because: String,
 }
 
 /// What stands between a labeler and the next question.
@@ -66,7 +78,8 @@ impl Store {
     /// else's hands are taken over when nothing else is left.
     ///
     /// # Errors
-    /// [`StoreError::Missing`] for an unknown run.
+    /// [`StoreError::Missing`] for an unknown run; [`StoreError::NotYours`] and
+    /// [`StoreError::StudyState`] for a run of a study.
     pub async fn lease(
         &self,
         run: RunId,
@@ -82,6 +95,7 @@ impl Store {
                 let method: String = row
                     .ok_or_else(|| StoreError::missing("run", &run))?
                     .try_get(0)?;
+                check_open(t, run, labeler).await?;
                 renew(t, run, labeler, now_ms).await?;
                 let mut n_open = count_open(t, run, labeler).await?;
                 let holder = Holder {
@@ -227,7 +241,8 @@ async fn count_open(
 }
 
 /// The next open question that nobody holds, or that somebody held too long; in the order of
-/// asking. A stage question follows its preference, to the same labeler with the same sides.
+/// asking. A stage question follows its preference, where that is asked, to the same labeler
+/// with the same sides. Sides of studies are planned.
 async fn next_question(
     t: &mut Transaction<'_>,
     holder: &Holder<'_>,
@@ -237,16 +252,17 @@ async fn next_question(
         "select question.id, question.kind,
             (select lease.left_is from lease join question as asked on asked.id = lease.question_id
              where asked.query_id = question.query_id and asked.kind = 'preference'
-                and lease.labeler_id = ?2 and lease.state != 'taken' limit 1) as mine,
+                and lease.labeler_id = ?2 and lease.state != 'taken' limit 1) as mine, study_turn.left_is as planned,
             held.id as held, held.labeler_id, held.left_is
          from question join query on query.id = question.query_id
+         left join study_turn on study_turn.query_id = query.id
          left join lease as held on held.question_id = question.id and held.state = 'open'
          where question.run_id = ?1 and question.state = 'open'
             and (query.clip_state = 'ready' or (?3 = 0 and query.clip_state in ('waiting', 'unwanted')))
             and (held.id is null or (held.labeler_id != ?2 and held.expires_at_ms <= ?4))
             and (question.kind = 'preference' or mine is not null
-                 or exists (select 1 from question as asked where asked.query_id = question.query_id
-                            and asked.kind = 'preference' and asked.state = 'answered'))
+                 or not exists (select 1 from question as asked where asked.query_id = question.query_id
+                                and asked.kind = 'preference' and asked.state != 'answered'))
          order by held.id is not null, query.session, query.position, question.kind limit 1",
     )
     .bind(holder.run.0)
@@ -260,7 +276,9 @@ async fn next_question(
         take(t, holder, &overdue, &row).await?;
     }
     let mine: Option<String> = row.try_get("mine")?;
-    Ok(Some((row.try_get("id")?, mine.as_deref().map(which))))
+    let planned: Option<String> = row.try_get("planned")?;
+    let left_is = mine.or(planned);
+    Ok(Some((row.try_get("id")?, left_is.as_deref().map(which))))
 }
 
 /// Ends somebody's overdue lease; what they saw does not count in their balance any more.
@@ -367,11 +385,14 @@ async fn open_leases(
     let rows = sqlx::query(
         "select lease.id, question.query_id, question.kind, lease.left_is, lease.expires_at_ms,
             a.sha256 as a_sha, a.n_frames as a_frames, a.fps as a_fps,
-            b.sha256 as b_sha, b.n_frames as b_frames, b.fps as b_fps
+            b.sha256 as b_sha, b.n_frames as b_frames, b.fps as b_fps,
+            iif(study_turn.role = 'practice', study_item.expects, null) as expects, study_item.because
          from lease join question on question.id = lease.question_id
          join query on query.id = question.query_id
          left join clip as a on a.sha256 = query.first_clip
          left join clip as b on b.sha256 = query.second_clip
+         left join study_turn on study_turn.query_id = query.id
+         left join study_item on study_item.id = study_turn.item_id
          where lease.labeler_id = ? and lease.state = 'open' and question.run_id = ? and question.state = 'open'
          order by query.session, query.position, question.kind",
     )
@@ -409,8 +430,22 @@ fn read(row: &SqliteRow, run: RunId) -> Result<Lease, StoreError> {
         left_is,
         left,
         right,
+        practice: practice(row)?.map(|practice| practice.seen_with(left_is)),
         expires_at_ms: row.try_get("expires_at_ms")?,
     })
+}
+
+impl Practice {
+    /// `first` and `second` become what they are on the labeler's page.
+    fn seen_with(self, left_is: Which) -> Self {
+        let side = |is_left| if is_left { "left" } else { "right" }.to_owned();
+        let expects = match self.expects.as_str() {
+            "first" => side(left_is == Which::First),
+            "second" => side(left_is == Which::Second),
+            _ => self.expects,
+        };
+        Self { expects, ..self }
+    }
 }
 
 pub(crate) fn question(kind: &str) -> Question {

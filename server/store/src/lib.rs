@@ -18,6 +18,7 @@ mod query;
 mod run;
 mod secret;
 mod store;
+mod study;
 mod time;
 mod token;
 mod writer;
@@ -25,14 +26,18 @@ mod writer;
 pub use answer::{NewAnswer, Pressed, StoredAnswer, Timing};
 pub use clip::{ClipInfo, NewClip};
 pub use demonstration::{DemonstrationRow, NewDemonstration};
-pub use error::StoreError;
+pub use error::{LinkTrouble, StoreError};
 pub use event::EventRow;
-pub use label::{AnsweredPair, Label};
+pub use label::{AnsweredPair, Label, LabelsOf};
 pub use labeler::{Labeler, LabelerId};
-pub use lease::{Lease, LeaseClip, Queue};
+pub use lease::{Lease, LeaseClip, Practice, Queue};
 pub use query::{BadQuery, ClipJob, QueryId, TaskRewards};
 pub use run::{NewRun, Progress, RunId, RunRow, RunState};
 pub use secret::Secret;
 pub use store::Store;
+pub use study::{
+    Entered, Entrance, ItemLine, ItemRole, NewItem, NewStudy, Part, SealedClips, Seat, StudyId,
+    StudyPlan, StudyRow,
+};
 pub use time::{now_ms, rfc3339};
 pub use token::{Bearer, TokenKind};

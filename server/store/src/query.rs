@@ -89,14 +89,15 @@ impl Store {
         .await
     }
 
-    /// The next query to draw, in the order of asking.
+    /// The next query to draw, in the order of asking; runs that people wait for come before
+    /// studies that are being prepared.
     ///
     /// # Errors
     /// When the database cannot be read.
     pub async fn next_clip_job(&self) -> Result<Option<ClipJob>, StoreError> {
         let row = sqlx::query(
             "select query.id, query.run_id, run.task from query join run on run.id = query.run_id
-             where clip_state = 'waiting' order by query.id limit 1",
+             where clip_state = 'waiting' order by run.study_id is not null, query.id limit 1",
         )
         .fetch_optional(self.readers())
         .await?;
@@ -264,6 +265,27 @@ async fn add(
     query: &OfferedQuery,
     clip_state: &str,
 ) -> Result<(), StoreError> {
+    let Some(id) = add_query(t, run, query, clip_state).await? else {
+        return Ok(());
+    };
+    let kinds: &[&str] = if query.asks_same_stage {
+        &["preference", "same_stage"]
+    } else {
+        &["preference"]
+    };
+    for kind in kinds {
+        ask(t, run, id, kind).await?;
+    }
+    Ok(())
+}
+
+/// Keeps a query and its segments, and asks nothing about it; `None` where it is kept already.
+pub(crate) async fn add_query(
+    t: &mut Transaction<'_>,
+    run: RunId,
+    query: &OfferedQuery,
+    clip_state: &str,
+) -> Result<Option<QueryId>, StoreError> {
     let row = sqlx::query(
         "insert into query (run_id, session, position, asks_same_stage, disagreement, stage_gap, typical_reward,
                             clip_state, created_at_ms)
@@ -280,29 +302,31 @@ async fn add(
     .bind(now_ms())
     .fetch_optional(&mut *t.connection)
     .await?;
-    let Some(row) = row else { return Ok(()) };
-    let id: i64 = row.try_get(0)?;
+    let Some(row) = row else { return Ok(None) };
+    let id = QueryId(row.try_get(0)?);
     add_segment(t, id, Which::First, &query.first).await?;
     add_segment(t, id, Which::Second, &query.second).await?;
-    let kinds: &[&str] = if query.asks_same_stage {
-        &["preference", "same_stage"]
-    } else {
-        &["preference"]
-    };
-    for kind in kinds {
-        sqlx::query("insert into question (run_id, query_id, kind) values (?, ?, ?)")
-            .bind(run.0)
-            .bind(id)
-            .bind(kind)
-            .execute(&mut *t.connection)
-            .await?;
-    }
+    Ok(Some(id))
+}
+
+pub(crate) async fn ask(
+    t: &mut Transaction<'_>,
+    run: RunId,
+    query: QueryId,
+    kind: &str,
+) -> Result<(), StoreError> {
+    sqlx::query("insert into question (run_id, query_id, kind) values (?, ?, ?)")
+        .bind(run.0)
+        .bind(query.0)
+        .bind(kind)
+        .execute(&mut *t.connection)
+        .await?;
     Ok(())
 }
 
 async fn add_segment(
     t: &mut Transaction<'_>,
-    query: i64,
+    query: QueryId,
     which: Which,
     record: &SegmentRecord,
 ) -> Result<(), StoreError> {
@@ -321,7 +345,7 @@ async fn add_segment(
         "insert into query_segment (query_id, which, episode, start, len, poses, task_rewards, stages)
          values (?, ?, ?, ?, ?, ?, ?, ?)",
     )
-    .bind(query)
+    .bind(query.0)
     .bind(word(which))
     .bind(record.segment.episode.0)
     .bind(record.segment.start)

@@ -8,7 +8,9 @@ use crate::audit::{self, Deed};
 use crate::error::StoreError;
 use crate::event;
 use crate::store::Store;
+use crate::study::StudyId;
 use crate::time::now_ms;
+use crate::writer::Transaction;
 
 /// Number of a run.
 #[derive(
@@ -79,6 +81,8 @@ pub struct RunRow {
     pub n_labels: u32,
     /// What it is doing.
     pub state: RunState,
+    /// The study that it is a part of.
+    pub study: Option<StudyId>,
     /// When it was made, milliseconds since 1970.
     pub created_at_ms: i64,
 }
@@ -117,36 +121,8 @@ impl Store {
     /// # Errors
     /// When it cannot be stored.
     pub async fn add_run(&self, run: NewRun) -> Result<RunId, StoreError> {
-        self.write(move |t| {
-            Box::pin(async move {
-                let now = now_ms();
-                let row = sqlx::query(
-                    "insert into run (task, method, preset, seed, teacher, draws_clips, config, budget, total_steps, is_trained,
-                        state, state_message, state_next, state_since_ms, created_at_ms)
-                     values (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, 'training', 'getting ready', '', ?, ?) returning id",
-                )
-                .bind(&run.task)
-                .bind(&run.method)
-                .bind(&run.preset)
-                .bind(run.seed.cast_signed())
-                .bind(&run.teacher)
-                .bind(run.draws_clips)
-                .bind(&run.config)
-                .bind(run.budget)
-                .bind(run.total_steps.cast_signed())
-                .bind(run.is_trained)
-                .bind(now)
-                .bind(now)
-                .fetch_one(&mut *t.connection)
-                .await?;
-                let id = RunId(row.get(0));
-                let detail = json!({"task": run.task, "method": run.method, "seed": run.seed, "teacher": run.teacher});
-                let deed = Deed { labeler: None, run: Some(id), action: "started", subject: "run", detail };
-                audit::record(t, deed).await?;
-                Ok(id)
-            })
-        })
-        .await
+        self.write(move |t| Box::pin(async move { insert(t, &run, None).await }))
+            .await
     }
 
     /// One run; `None` for a number that no run has.
@@ -161,12 +137,12 @@ impl Store {
         row.as_ref().map(read).transpose()
     }
 
-    /// All runs, newest first.
+    /// All runs, newest first; those of studies are told by their study.
     ///
     /// # Errors
     /// When the database cannot be read.
     pub async fn runs(&self) -> Result<Vec<RunRow>, StoreError> {
-        let rows = sqlx::query("select * from run order by id desc")
+        let rows = sqlx::query("select * from run where study_id is null order by id desc")
             .fetch_all(self.readers())
             .await?;
         rows.iter().map(read).collect()
@@ -264,7 +240,8 @@ impl Store {
                          order by sequence desc limit 1) as pressed
                     from newest join query on query.run_id = ?1 and query.session = newest.session
                     join question on question.query_id = query.id and question.kind = 'preference')
-             select run.n_labels, run.budget, (select session from newest),
+             select run.n_labels, run.budget,
+                iif(run.study_id is null, (select session from newest), null),
                 (select count(*) from state where pressed is not null and pressed != 'skip'),
                 (select count(*) from state where pressed is null or pressed != 'skip')
              from run where run.id = ?1",
@@ -281,6 +258,47 @@ impl Store {
             session_size: row.try_get(4)?,
         })
     }
+}
+
+/// Keeps a new run, in state `training`.
+pub(crate) async fn insert(
+    t: &mut Transaction<'_>,
+    run: &NewRun,
+    study: Option<StudyId>,
+) -> Result<RunId, StoreError> {
+    let now = now_ms();
+    let row = sqlx::query(
+        "insert into run (task, method, preset, seed, teacher, draws_clips, config, budget, total_steps, is_trained,
+            study_id, state, state_message, state_next, state_since_ms, created_at_ms)
+         values (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, 'training', 'getting ready', '', ?, ?) returning id",
+    )
+    .bind(&run.task)
+    .bind(&run.method)
+    .bind(&run.preset)
+    .bind(run.seed.cast_signed())
+    .bind(&run.teacher)
+    .bind(run.draws_clips)
+    .bind(&run.config)
+    .bind(run.budget)
+    .bind(run.total_steps.cast_signed())
+    .bind(run.is_trained)
+    .bind(study.map(|study| study.0))
+    .bind(now)
+    .bind(now)
+    .fetch_one(&mut *t.connection)
+    .await?;
+    let id = RunId(row.get(0));
+    let detail =
+        json!({"task": run.task, "method": run.method, "seed": run.seed, "teacher": run.teacher});
+    let deed = Deed {
+        labeler: None,
+        run: Some(id),
+        action: "started",
+        subject: "run",
+        detail,
+    };
+    audit::record(t, deed).await?;
+    Ok(id)
 }
 
 fn read(row: &SqliteRow) -> Result<RunRow, StoreError> {
@@ -304,6 +322,7 @@ fn read(row: &SqliteRow) -> Result<RunRow, StoreError> {
             next: row.try_get("state_next")?,
             since_ms: row.try_get("state_since_ms")?,
         },
+        study: row.try_get::<Option<i64>, _>("study_id")?.map(StudyId),
         created_at_ms: row.try_get("created_at_ms")?,
     })
 }

@@ -17,6 +17,28 @@ impl Secret {
         Ok(Self(hex(&random::<32>()?)))
     }
 
+    /// Twelve random letters and digits (59 bits) that are read and typed without mistakes: a
+    /// code for people.
+    ///
+    /// # Errors
+    /// When the system gives no random numbers.
+    pub fn for_people() -> Result<Self, StoreError> {
+        // No i, l, o, 0, 1; 31 characters, and ~ for the rest, which is drawn again.
+        const LETTERS: &[u8; 32] = b"abcdefghjkmnpqrstuvwxyz23456789~";
+        let mut code = String::new();
+        while code.len() < 12 {
+            let letter = char::from(LETTERS[usize::from(random::<1>()?[0] & 31)]);
+            code.extend(Some(letter).filter(|letter| *letter != '~'));
+        }
+        Ok(Self(code))
+    }
+
+    /// A code that a person typed, whatever its capitals and gaps.
+    pub fn typed(text: &str) -> Self {
+        let kept = text.chars().filter(char::is_ascii_alphanumeric);
+        Self(kept.map(|letter| letter.to_ascii_lowercase()).collect())
+    }
+
     /// A secret that somebody brought.
     pub fn brought(text: impl Into<String>) -> Self {
         Self(text.into())
