@@ -5,4 +5,6 @@ mod clips;
 mod leases;
 mod runs;
 mod store_on_disk;
+pub(crate) mod studies;
+mod study_blinding;
 mod throughput;

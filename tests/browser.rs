@@ -5,4 +5,5 @@ mod driver;
 mod in_step;
 mod labeler;
 mod session;
+mod studies;
 mod weight;

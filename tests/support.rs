@@ -25,9 +25,17 @@ pub(crate) struct Reply {
     pub(crate) status: u16,
     pub(crate) headers: ureq::http::HeaderMap,
     pub(crate) text: String,
+    /// As they came.
+    bytes: Vec<u8>,
 }
 
 impl Reply {
+    /// The first eight bytes of the body.
+    pub(crate) fn first_bytes(&self) -> u64 {
+        let first = self.bytes.first_chunk().expect("a body of eight bytes");
+        u64::from_be_bytes(*first)
+    }
+
     /// The body as JSON; null where it is none.
     pub(crate) fn json(&self) -> Value {
         serde_json::from_str(&self.text).unwrap_or_default()
@@ -87,12 +95,7 @@ impl TestApp {
             .stranger()
             .send("POST", "/api/v1/labelers", Some(&json!({"name": name})))
             .expect(201);
-        let cookie = reply.headers["set-cookie"].to_str().expect("text");
-        let cookie = cookie.split(';').next().expect("a pair").to_owned();
-        Client {
-            header: Some(("cookie", cookie)),
-            ..self.stranger()
-        }
+        self.stranger().with_cookie_of(&reply)
     }
 
     /// A program with a teacher token.
@@ -106,6 +109,43 @@ impl TestApp {
 }
 
 impl Client {
+    /// Somebody without a name, at a server without a run.
+    pub(crate) fn stranger_of(server: &ServerProcess) -> Self {
+        Self {
+            address: server.address.clone(),
+            header: None,
+            run: String::new(),
+        }
+    }
+
+    /// The same at another run.
+    pub(crate) fn on_run(&self, run: &str) -> Self {
+        Self {
+            run: run.to_owned(),
+            ..self.clone()
+        }
+    }
+
+    /// Whose browser has the cookie that a reply sets.
+    pub(crate) fn with_cookie_of(&self, reply: &Reply) -> Self {
+        let cookie = reply.headers["set-cookie"].to_str().expect("text");
+        let cookie = cookie.split(';').next().expect("a pair").to_owned();
+        Self {
+            header: Some(("cookie", cookie)),
+            ..self.clone()
+        }
+    }
+
+    /// The run's number.
+    pub(crate) fn run(&self) -> String {
+        self.run.clone()
+    }
+
+    /// Where leases are had.
+    pub(crate) fn leases_path(&self) -> String {
+        format!("/api/v1/runs/{}/leases", self.run)
+    }
+
     /// One request.
     pub(crate) fn send(&self, method: &str, path: &str, body: Option<&Value>) -> Reply {
         self.send_with(method, path, body.map(Value::to_string), &[])
@@ -140,11 +180,12 @@ impl Client {
             .timeout_global(Some(PATIENCE));
         let agent: Agent = config.build().into();
         let mut response: Response<Body> = agent.run(request).expect("a reply");
-        let text = response.body_mut().read_to_string().unwrap_or_default();
+        let bytes = response.body_mut().read_to_vec().unwrap_or_default();
         Reply {
             status: response.status().as_u16(),
             headers: response.headers().clone(),
-            text,
+            text: String::from_utf8_lossy(&bytes).into_owned(),
+            bytes,
         }
     }
 

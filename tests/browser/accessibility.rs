@@ -5,6 +5,7 @@ use serde_json::json;
 
 use super::driver::{Browser, Scheme};
 use super::labeler::{Desk, answer};
+use crate::api::studies::Open;
 
 /// axe-core, unchanged; its version, hash and licence lie beside it.
 const AXE: &str = include_str!("vendor/axe.min.js");
@@ -35,6 +36,10 @@ async fn look_at_every_page(scheme: Scheme, size: (u32, u32)) {
     look("home", &browser).await;
     browser.goto(&desk.page("/experiments")).await;
     look("experiments", &browser).await;
+    browser.goto(&desk.page("/studies")).await;
+    look("studies", &browser).await;
+    browser.goto(&desk.page("/join")).await;
+    look("return", &browser).await;
     browser.goto(&desk.page("/runs/no-such-run")).await;
     look("problem", &browser).await;
     browser.goto(&desk.label_page()).await;
@@ -52,6 +57,54 @@ async fn look_at_every_page(scheme: Scheme, size: (u32, u32)) {
         .goto(&desk.page(&format!("/runs/{}", desk.run)))
         .await;
     look("run", &browser).await;
+}
+
+/// Every page of a study, from its preparation to its results.
+#[tokio::test(flavor = "multi_thread")]
+async fn axe_finds_nothing_on_the_pages_of_a_study() {
+    let Some(browser) = Browser::open(Scheme::Dark, (360, 740)).await else {
+        return;
+    };
+    let study = tokio::task::spawn_blocking(|| Open::start("preference"));
+    let study = study.await.expect("a study");
+    let page = |path: &str| format!("http://{}{path}", study.server.address);
+    browser.goto(&page("/studies/1")).await;
+    look("study", &browser).await;
+    browser
+        .value("(document.querySelector('.invite button').click(), true)")
+        .await;
+    browser
+        .until("document.querySelector('[data-link]') !== null")
+        .await;
+    look("invited", &browser).await;
+    let link = browser
+        .value("document.querySelector('[data-link]').value")
+        .await;
+    browser.goto(link.as_str().expect("a link")).await;
+    look("join", &browser).await;
+    browser.press(" ").await;
+    browser.press("\u{E007}").await;
+    browser
+        .until("document.querySelector('#begin') !== null")
+        .await;
+    look("welcome", &browser).await;
+    browser.goto(&page("/seat")).await;
+    look("seat", &browser).await;
+    browser.press("\u{E007}").await;
+    browser
+        .until("document.querySelector('#guidance[open]') !== null")
+        .await;
+    browser.press("\u{E007}").await;
+    browser.until("document.body.dataset.shown").await;
+    look("practice", &browser).await;
+    answer(&browser, "1").await;
+    browser
+        .until("document.querySelector('#feedback[open]') !== null")
+        .await;
+    look("feedback", &browser).await;
+    study.close();
+    browser.goto(&page("/seat")).await;
+    look("closed", &browser).await;
 }
 
 async fn look(page: &str, browser: &Browser) {

@@ -22,6 +22,9 @@ const run = page.dataset.run;
 const player = $('pair');
 const guidance = $('guidance');
 const reasons = $('reasons');
+/** A study: fixed pairs, practice with a word on each answer, and a task after this one. */
+const isStudy = 'study' in page.dataset;
+const feedback = $('feedback');
 
 /** What is on: `{lease, left, right}`, and whether it is an answered one that was gone back to. */
 let current = null;
@@ -75,6 +78,7 @@ function show(pair, before) {
   const isStage = pair.lease.question === 'same_stage';
   page.dataset.question = pair.lease.question;
   $('question').textContent = isStage ? 'Are both at the same stage of the task?' : 'Which one does better?';
+  $('practice').hidden = !pair.lease.practice;
   $('again').hidden = !isChanging;
   if (isChanging) $('before').textContent = WORDS[before] ?? before;
   $('undo').disabled = undoable() === null;
@@ -82,7 +86,7 @@ function show(pair, before) {
   page.dataset.shown = '';
   setStage('working');
   player.show(pair.left, pair.right);
-  if (guidance.open) holdClips();
+  if (guidance.open || feedback?.open) holdClips();
 }
 
 function setStage(stage) {
@@ -119,9 +123,18 @@ function answer(word, input, reason = null, pressed = performance.now()) {
   pressedAt = pressed;
   tellUnsaved();
   const kept = wasChange ? outbox.change(pair.lease, body) : keepFirst(pair, body);
+  if (pair.lease.practice) tellPractice(pair.lease.practice, word);
   proceed();
   releasePair(pair);
   kept.catch((failure) => notice(`This browser could not keep the answer: ${failure.message}`, true));
+}
+
+/** What most people would say, right after the answer. */
+function tellPractice({ expects, because }, word) {
+  const isRight = word === expects;
+  $('feedback-title').textContent = isRight ? 'Yes' : `Most people say: ${WORDS[expects]}`;
+  $('feedback-text').textContent = because;
+  feedback.showModal();
 }
 
 async function keepFirst(pair, body) {
@@ -205,6 +218,7 @@ function proceedIfReady() {
 }
 
 function tellProgress({ state, progress }) {
+  if (isStudy && state.kind === 'done' && !current) return leaveWhenSent();
   const { answered: n, budget, session, session_answered, session_size } = progress;
   $('answers').textContent = `${n} of ${budget} answers`;
   $('bar').max = budget;
@@ -212,6 +226,11 @@ function tellProgress({ state, progress }) {
   const hasSession = session !== null && session !== undefined && session_size;
   $('session').textContent = hasSession ? `round ${session + 1}: ${session_answered} of ${session_size}` : '';
   if (page.dataset.stage === 'waiting' || !current) tellWaiting(state);
+}
+
+/** The next task of a study, once every answer is with the server. */
+async function leaveWhenSent() {
+  if (await outbox.isEmpty()) location.assign('/seat');
 }
 
 const HEADINGS = {
@@ -247,7 +266,7 @@ let curveAt = 0;
 
 /** Success so far, at most every two seconds, while there is nothing else to look at. */
 async function tellCurve(kind) {
-  if (!['waiting', 'done'].includes(kind) || Date.now() - curveAt < 2_000) return;
+  if (isStudy || !['waiting', 'done'].includes(kind) || Date.now() - curveAt < 2_000) return;
   curveAt = Date.now();
   const events = await request('GET', `/api/v1/runs/${run}/metrics`).catch(() => null);
   const points = events ? foldEvents(events).success : [];
@@ -315,6 +334,10 @@ function holdClips() {
 
 function guidanceClosed() {
   localStorage.setItem('stair-guidance', page.dataset.guidance);
+  resumeClips();
+}
+
+function resumeClips() {
   if (playsOn && current && !player.playing) player.toggle();
   playsOn = false;
 }
@@ -351,6 +374,7 @@ function listen() {
   });
   tabs.addEventListener('message', ({ data }) => answeredElsewhere(data));
   guidance.addEventListener('close', guidanceClosed);
+  feedback?.addEventListener('close', resumeClips);
   $('shortcuts').addEventListener('change', () => {
     usesShortcuts = $('shortcuts').checked;
     localStorage.setItem('stair-shortcuts', usesShortcuts ? 'on' : 'off');
@@ -388,6 +412,7 @@ function answeredElsewhere(leaseId) {
 function keyPressed(event) {
   if (!usesShortcuts || event.ctrlKey || event.metaKey || event.altKey || event.repeat && !PLAYER_KEYS[event.key]) return;
   if (reasons.open) return reasonPressed(event);
+  if (feedback?.open) return; // Enter and Escape are the dialog's own
   if (guidance.open) {
     if (event.key === '?') guidance.close();
     return;

@@ -78,6 +78,11 @@ export class Outbox extends EventTarget {
     return new Set(await this.#read('answered', (store) => store.getAllKeys()));
   }
 
+  /** Whether the server has acknowledged every answer. @returns {Promise<boolean>} */
+  async isEmpty() {
+    return (await this.#read('unsent', (store) => store.count())) === 0;
+  }
+
   #sendSoon(afterMs) {
     clearTimeout(this.#timer);
     this.#timer = setTimeout(() => this.#sendAll(), afterMs);

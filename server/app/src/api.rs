@@ -10,6 +10,8 @@ pub mod labels;
 pub mod leases;
 pub mod queries;
 pub mod runs;
+pub mod seats;
+pub mod studies;
 pub mod tasks;
 
 /// OpenAPI 3.1, generated from the handlers.
@@ -37,6 +39,17 @@ pub mod tasks;
         events::follow,
         events::metrics,
         labels::export,
+        studies::list,
+        studies::create,
+        studies::read,
+        studies::retry,
+        studies::open,
+        studies::close,
+        studies::invite,
+        studies::labels,
+        studies::figure,
+        seats::join,
+        seats::read,
         labelers::create,
         health::livez,
         health::readyz,

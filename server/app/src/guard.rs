@@ -9,7 +9,7 @@ use axum::middleware::Next;
 use axum::response::{IntoResponse as _, Response};
 use store::{Secret, TokenKind};
 
-use crate::extract::{ACCESS_COOKIE, bearer, cookie};
+use crate::extract::{ACCESS_COOKIE, bearer, cookie, labeler};
 use crate::problem::Problem;
 use crate::state::AppState;
 
@@ -92,9 +92,9 @@ pub async fn admit(State(app): State<AppState>, request: Request, next: Next) ->
     if let Err(problem) = checked {
         return problem.into_response();
     }
-    let is_open = matches!(request.uri().path(), "/livez" | "/enter");
-    if app.needs_token && !is_open {
-        match may_enter(&app, request.headers()).await {
+    let path = request.uri().path();
+    if app.needs_token && !is_open(path) {
+        match may_enter(&app, request.headers(), path).await {
             Ok(true) => {}
             Ok(false) => return Problem::token_needed().into_response(),
             Err(problem) => return problem.into_response(),
@@ -144,7 +144,31 @@ fn host(headers: &HeaderMap) -> Option<Authority> {
     headers.get(header::HOST)?.to_str().ok()?.parse().ok()
 }
 
-async fn may_enter(app: &AppState, headers: &HeaderMap) -> Result<bool, Problem> {
+/// What anybody may ask of a server on a network: whether it is up, the doors, and how they look.
+fn is_open(path: &str) -> bool {
+    matches!(
+        path,
+        "/livez" | "/enter" | "/join" | "/join/return" | "/api/v1/join"
+    ) || path.starts_with("/static/")
+}
+
+/// What a labeler of a study needs, who has no token of the server.
+fn is_for_labelers(path: &str) -> bool {
+    let is_own = matches!(path, "/seat" | "/api/v1/seat");
+    let is_of_run = |path: &str, end| {
+        let number = path.strip_suffix(end).unwrap_or_default();
+        !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit())
+    };
+    let page = path.strip_prefix("/runs/");
+    let leases = path.strip_prefix("/api/v1/runs/");
+    is_own
+        || page.is_some_and(|rest| is_of_run(rest, "/label"))
+        || leases.is_some_and(|rest| is_of_run(rest, "/leases"))
+        || path.starts_with("/api/v1/leases/")
+        || path.starts_with("/api/v1/clips/")
+}
+
+async fn may_enter(app: &AppState, headers: &HeaderMap, path: &str) -> Result<bool, Problem> {
     let access = cookie(headers, ACCESS_COOKIE).map(Secret::brought);
     for secret in bearer(headers).into_iter().chain(access) {
         let kind = app.store.bearer(&secret).await?.map(|bearer| bearer.kind);
@@ -152,7 +176,14 @@ async fn may_enter(app: &AppState, headers: &HeaderMap) -> Result<bool, Problem>
             return Ok(true);
         }
     }
-    Ok(false)
+    if !is_for_labelers(path) {
+        return Ok(false);
+    }
+    // Whoever was invited, to what the study asks of them; leases and pages see to the rest.
+    match labeler(app, headers).await? {
+        Some(labeler) => Ok(app.store.seat_of(labeler.id).await?.is_some()),
+        None => Ok(false),
+    }
 }
 
 #[cfg(test)]
@@ -177,6 +208,31 @@ mod tests {
         assert!(check_host(&headers(&[("host", "localhost")]), false).is_ok());
         assert!(check_host(&headers(&[("host", "evil.example:8080")]), false).is_err());
         assert!(check_host(&headers(&[]), false).is_err());
+    }
+
+    #[test]
+    fn an_invited_labeler_reaches_their_pairs_and_nothing_of_the_researchers() {
+        for path in [
+            "/seat",
+            "/runs/12/label",
+            "/api/v1/runs/12/leases",
+            "/api/v1/leases/ab/answer",
+            "/api/v1/clips/ab.mp4",
+        ] {
+            assert!(is_for_labelers(path), "{path}");
+        }
+        for path in [
+            "/",
+            "/runs/12",
+            "/runs/12/labels/label",
+            "/api/v1/runs/12",
+            "/api/v1/runs/12/labels",
+            "/api/v1/studies/1/labels",
+            "/studies/1",
+            "/api/v1/queries/1/task-rewards",
+        ] {
+            assert!(!is_for_labelers(path) && !is_open(path), "{path}");
+        }
     }
 
     #[test]

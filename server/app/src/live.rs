@@ -1,4 +1,5 @@
-//! The runs that are up: each on its own thread, driven by `lab`, watched by pages.
+//! The runs that are up: each on its own thread, driven by `lab`, watched by pages; and the
+//! studies that are being prepared.
 //!
 //! Invariants: a run that fails or panics ends alone, with its reason shown; a run never touches
 //! HTTP; whatever is up when the process ends goes on by itself at the next start.
@@ -13,7 +14,7 @@ use std::thread::JoinHandle;
 use anyhow::Context as _;
 use lab::message::{Command, Phase};
 use serde_json::Value;
-use store::{RunId, Store};
+use store::{RunId, Store, StudyId};
 use tokio::runtime::Handle;
 use tokio::sync::{broadcast, watch};
 
@@ -21,10 +22,12 @@ mod clip_worker;
 mod driver;
 mod human_teacher;
 mod state_line;
+mod study;
 
 use clip_worker::ClipQueue;
 pub use driver::HUMAN;
 pub use state_line::{StateKind, StateLine};
+pub use study::parse as parse_study;
 
 /// Events of the moment that a slow reader may fall behind; only the newest matters.
 const BACKLOG: usize = 64;
@@ -38,6 +41,7 @@ struct Inner {
     runtime: Handle,
     clips: ClipQueue,
     clip_thread: Mutex<Option<JoinHandle<()>>>,
+    study_threads: Mutex<Vec<JoinHandle<()>>>,
     events: broadcast::Sender<LiveEvent>,
     runs: Mutex<BTreeMap<RunId, LiveRun>>,
     is_closing: AtomicBool,
@@ -110,6 +114,7 @@ impl Live {
             runtime,
             clips,
             clip_thread: Mutex::new(Some(thread)),
+            study_threads: Mutex::default(),
             events: broadcast::channel(BACKLOG).0,
             runs: Mutex::default(),
             is_closing: AtomicBool::new(false),
@@ -123,8 +128,27 @@ impl Live {
                 live.spawn(run.id)?;
             }
         }
+        let studies = live.0.store.studies().await;
+        for study in studies.context("cannot read the studies")? {
+            if study.state == "preparing" {
+                tracing::info!("going on with preparing study {}", study.id);
+                live.prepare(study.id)?;
+            }
+        }
         live.0.clips.wake();
         Ok(live)
+    }
+
+    /// Gets a study ready: chooses its segments, draws its clips, and gives all of them one
+    /// length. Whatever of that is done already stays.
+    ///
+    /// # Errors
+    /// [`LiveError::Closing`]; [`LiveError::Thread`].
+    pub fn prepare(&self, study: StudyId) -> Result<(), LiveError> {
+        if self.0.is_closing.load(Ordering::SeqCst) {
+            return Err(LiveError::Closing);
+        }
+        Ok(study::start(&self.0, study)?)
     }
 
     /// Starts a run that the store knows, or goes on with it.
@@ -262,7 +286,8 @@ impl Inner {
             .collect();
         self.clips.close();
         let clips = lock(&self.clip_thread).take();
-        for thread in threads.into_iter().chain(clips) {
+        let studies = std::mem::take(&mut *lock(&self.study_threads));
+        for thread in threads.into_iter().chain(clips).chain(studies) {
             // A panic inside a run was caught there; one outside was printed by the hook.
             let _ = thread.join();
         }

@@ -16,12 +16,14 @@ mod cli;
 mod experiments;
 mod extract;
 mod guard;
+mod label_table;
 mod live;
 mod pages;
 mod policy;
 mod problem;
 mod router;
 mod state;
+mod study_results;
 
 fn main() -> ExitCode {
     cli::main()

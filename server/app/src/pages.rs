@@ -6,10 +6,14 @@ pub mod experiment;
 pub mod experiments;
 pub mod guidance;
 pub mod home;
+pub mod join;
 pub mod label;
 mod markdown;
 pub mod problem;
 pub mod run;
+pub mod seat;
+pub mod studies;
+pub mod study;
 
 use askama::Template;
 use axum::response::{Html, IntoResponse, Response};

@@ -87,6 +87,38 @@ impl Problem {
         )
     }
 
+    /// 404: no study has this number.
+    pub fn study_not_found(id: impl std::fmt::Display) -> Self {
+        let detail = format!("There is no study {id}. The list of studies is at /studies.");
+        Self::new(
+            StatusCode::NOT_FOUND,
+            "/problems/study-not-found",
+            "There is no such study",
+            detail,
+        )
+    }
+
+    /// 404: the labeler takes part in no study.
+    pub fn no_seat() -> Self {
+        let detail = "You take part in no study in this browser. Open the link that you were sent, or enter your return code at /join.";
+        Self::new(
+            StatusCode::NOT_FOUND,
+            "/problems/no-seat",
+            "No study to take part in",
+            detail,
+        )
+    }
+
+    /// 422: a study's file with mistakes.
+    pub fn unusable_study(detail: impl Into<String>) -> Self {
+        Self::new(
+            StatusCode::UNPROCESSABLE_ENTITY,
+            "/problems/unusable-study",
+            "This study cannot be used",
+            detail,
+        )
+    }
+
     /// 404: no experiment has this name, or none of its files.
     pub fn experiment_not_found(name: &str) -> Self {
         let detail =
@@ -206,6 +238,9 @@ impl IntoResponse for Problem {
 
 impl From<StoreError> for Problem {
     fn from(error: StoreError) -> Self {
+        if let Some(problem) = crate::api::studies::problem(&error) {
+            return problem;
+        }
         let detail = error.to_string();
         let problem = |status, kind, title| Self::new(status, kind, title, detail.clone());
         match error {

@@ -8,7 +8,9 @@ use axum::routing::{get, post, put};
 use tower_http::compression::CompressionLayer;
 use tower_http::compression::predicate::{DefaultPredicate, NotForContentType, Predicate as _};
 
-use crate::api::{clips, events, health, labelers, labels, leases, openapi, queries, runs, tasks};
+use crate::api::{
+    clips, events, health, labelers, labels, leases, openapi, queries, runs, seats, studies, tasks,
+};
 use crate::problem::Problem;
 use crate::state::AppState;
 use crate::{assets, guard, pages};
@@ -32,6 +34,7 @@ pub fn router(state: AppState) -> Router {
         .route("/runs/{id}/resume", post(pages::run::resume))
         .route("/runs/{id}/stop", post(pages::run::stop))
         .merge(experiments())
+        .merge(study_pages())
         .merge(api())
         .route("/enter", get(labelers::enter))
         .route("/static/{*path}", get(assets::file))
@@ -50,6 +53,22 @@ fn experiments() -> Router<AppState> {
         .route("/experiments", get(pages::experiments::page))
         .route("/experiments/{name}", get(pages::experiment::page))
         .route("/experiments/{name}/{file}", get(pages::experiment::file))
+}
+
+fn study_pages() -> Router<AppState> {
+    Router::new()
+        .route(
+            "/studies",
+            get(pages::studies::page).post(pages::studies::prepare),
+        )
+        .route("/studies/{id}", get(pages::study::page))
+        .route("/studies/{id}/retry", post(pages::study::retry))
+        .route("/studies/{id}/open", post(pages::study::open))
+        .route("/studies/{id}/close", post(pages::study::close))
+        .route("/studies/{id}/invitations", post(pages::study::invite))
+        .route("/join", get(pages::join::page).post(pages::join::enter))
+        .route("/join/return", post(pages::join::come_back))
+        .route("/seat", get(pages::seat::page))
 }
 
 fn api() -> Router<AppState> {
@@ -78,4 +97,14 @@ fn api() -> Router<AppState> {
             get(queries::task_rewards),
         )
         .route("/api/v1/clips/{name}", get(clips::file))
+        .route("/api/v1/studies", get(studies::list).post(studies::create))
+        .route("/api/v1/studies/{id}", get(studies::read))
+        .route("/api/v1/studies/{id}/retry", post(studies::retry))
+        .route("/api/v1/studies/{id}/open", post(studies::open))
+        .route("/api/v1/studies/{id}/close", post(studies::close))
+        .route("/api/v1/studies/{id}/invitations", post(studies::invite))
+        .route("/api/v1/studies/{id}/labels", get(studies::labels))
+        .route("/api/v1/studies/{id}/figures/{name}", get(studies::figure))
+        .route("/api/v1/join", post(seats::join))
+        .route("/api/v1/seat", get(seats::read))
 }

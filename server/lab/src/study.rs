@@ -6,12 +6,14 @@
 
 mod file;
 mod known_pair;
+mod plan;
 mod ready;
 mod section;
 mod source;
 
 pub use file::StudyFile;
 pub use known_pair::{Expected, KnownPair, Player, Shot};
+pub use plan::{PairRole, PlanError, PlannedPair, plan};
 pub use ready::READY;
 pub use section::{Mistake, Mistakes};
 pub use source::{QuerySet, Source};

@@ -63,6 +63,25 @@ pub fn encode(frames: &[RgbaImage], fps: u32) -> Result<Clip, RenderError> {
     })
 }
 
+/// Bytes that [`padded`] adds at least: the head of an MP4 box.
+pub const LEAST_PADDING: usize = 8;
+
+/// A clip's file with a `free` box behind it, `len` bytes in all, and the SHA-256 that names it
+/// then. Players skip such a box.
+///
+/// # Panics
+/// When the file is within [`LEAST_PADDING`] bytes of `len`, or longer.
+pub fn padded(file: &[u8], len: usize) -> (Vec<u8>, String) {
+    let padding = len.saturating_sub(file.len());
+    assert!(padding >= LEAST_PADDING, "room for the head of a box");
+    let mut bytes = file.to_vec();
+    bytes.extend((padding as u32).to_be_bytes());
+    bytes.extend(b"free");
+    bytes.resize(len, 0);
+    let sha256 = hex(&Sha256::digest(&bytes));
+    (bytes, sha256)
+}
+
 fn hex(bytes: &[u8]) -> String {
     use std::fmt::Write;
     bytes.iter().fold(String::new(), |mut text, byte| {
@@ -84,6 +103,21 @@ mod tests {
         assert_eq!(clip, encode(&frames, 20).expect("encodes"));
         assert_eq!((clip.n_frames, clip.width, clip.height), (6, 64, 48));
         assert_eq!(clip.sha256.len(), 64);
+    }
+
+    #[test]
+    fn a_padded_clip_is_the_clip_and_a_box_that_players_skip() {
+        let frames: Vec<RgbaImage> = (0..3).map(|n| bar_code::frame(n, (64, 48))).collect();
+        let clip = encode(&frames, 20).expect("encodes");
+        let len = clip.bytes.len() + LEAST_PADDING + 5;
+        let (bytes, sha256) = padded(&clip.bytes, len);
+        assert_eq!((bytes.len(), sha256.len()), (len, 64));
+        assert_ne!(sha256, clip.sha256);
+        let (file, padding) = bytes.split_at(clip.bytes.len());
+        assert_eq!(
+            (file, padding),
+            (&clip.bytes[..], &b"\0\0\0\x0dfree\0\0\0\0\0"[..])
+        );
     }
 
     #[test]

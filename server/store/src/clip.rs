@@ -36,6 +36,10 @@ pub struct ClipInfo {
     pub n_frames: u32,
     /// Pictures a second.
     pub fps: u32,
+    /// Pixels.
+    pub width: u32,
+    /// Pixels.
+    pub height: u32,
     /// Bytes.
     pub n_bytes: u64,
 }
@@ -46,16 +50,18 @@ impl Store {
     /// # Errors
     /// [`StoreError::Missing`].
     pub async fn clip(&self, sha256: &str) -> Result<(ClipInfo, PathBuf), StoreError> {
-        let row = sqlx::query("select sha256, n_frames, fps, n_bytes from clip where sha256 = ?")
+        let row = sqlx::query("select * from clip where sha256 = ?")
             .bind(sha256)
             .fetch_optional(self.readers())
             .await?;
         let row = row.ok_or_else(|| StoreError::missing("clip", &sha256))?;
         let info = ClipInfo {
-            sha256: row.try_get(0)?,
-            n_frames: row.try_get(1)?,
-            fps: row.try_get(2)?,
-            n_bytes: row.try_get::<i64, _>(3)?.unsigned_abs(),
+            sha256: row.try_get("sha256")?,
+            n_frames: row.try_get("n_frames")?,
+            fps: row.try_get("fps")?,
+            width: row.try_get("width")?,
+            height: row.try_get("height")?,
+            n_bytes: row.try_get::<i64, _>("n_bytes")?.unsigned_abs(),
         };
         let path = path_of(self.folder(), &info.sha256);
         Ok((info, path))

@@ -1,6 +1,6 @@
 //! Answers as researchers read them: one row each, with everything that belongs to it.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use sqlx::Row as _;
 use sqlx::sqlite::SqliteRow;
 
@@ -11,7 +11,8 @@ use crate::study::StudyId;
 use crate::time::rfc3339;
 
 /// One answer with all that belongs to it; the columns of every export, in this order.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Label {
     /// Name of the answer.
     pub answer_id: String,
@@ -103,52 +104,74 @@ pub enum LabelsOf {
     Study(StudyId),
 }
 
+/// Some answers of many.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LabelPage {
+    /// In the order in which they were stored.
+    pub labels: Vec<Label>,
+    /// Where the next page begins; `None` on the last.
+    pub next: Option<i64>,
+}
+
+/// What a column holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ColumnKind {
+    /// Text.
+    Text,
+    /// A whole number.
+    Integer,
+    /// A number.
+    Number,
+    /// True or false.
+    Truth,
+}
+
 impl Label {
-    /// Names of the columns, in order.
-    pub const COLUMNS: &[&str] = &[
-        "answer_id",
-        "run_id",
-        "task",
-        "method",
-        "seed",
-        "question",
-        "sequence",
-        "query_id",
-        "session",
-        "position",
-        "labeler",
-        "pressed",
-        "meaning",
-        "left_is",
-        "reason",
-        "supersedes",
-        "is_current",
-        "first_episode",
-        "first_start",
-        "first_clip",
-        "second_episode",
-        "second_start",
-        "second_clip",
-        "segment_len",
-        "disagreement",
-        "stage_gap",
-        "guidance_sha256",
-        "visible_ms",
-        "hidden_ms",
-        "loops",
-        "seeks",
-        "speed",
-        "dropped_frames",
-        "input",
-        "stored_at",
-        "study_id",
-        "item_id",
-        "role",
-        "expects",
+    /// Names of the columns and what they hold, in order.
+    pub const COLUMNS: &[(&str, ColumnKind)] = &[
+        ("answer_id", ColumnKind::Text),
+        ("run_id", ColumnKind::Integer),
+        ("task", ColumnKind::Text),
+        ("method", ColumnKind::Text),
+        ("seed", ColumnKind::Integer),
+        ("question", ColumnKind::Text),
+        ("sequence", ColumnKind::Integer),
+        ("query_id", ColumnKind::Integer),
+        ("session", ColumnKind::Integer),
+        ("position", ColumnKind::Integer),
+        ("labeler", ColumnKind::Text),
+        ("pressed", ColumnKind::Text),
+        ("meaning", ColumnKind::Text),
+        ("left_is", ColumnKind::Text),
+        ("reason", ColumnKind::Text),
+        ("supersedes", ColumnKind::Text),
+        ("is_current", ColumnKind::Truth),
+        ("first_episode", ColumnKind::Integer),
+        ("first_start", ColumnKind::Integer),
+        ("first_clip", ColumnKind::Text),
+        ("second_episode", ColumnKind::Integer),
+        ("second_start", ColumnKind::Integer),
+        ("second_clip", ColumnKind::Text),
+        ("segment_len", ColumnKind::Integer),
+        ("disagreement", ColumnKind::Number),
+        ("stage_gap", ColumnKind::Number),
+        ("guidance_sha256", ColumnKind::Text),
+        ("visible_ms", ColumnKind::Integer),
+        ("hidden_ms", ColumnKind::Integer),
+        ("loops", ColumnKind::Number),
+        ("seeks", ColumnKind::Integer),
+        ("speed", ColumnKind::Number),
+        ("dropped_frames", ColumnKind::Integer),
+        ("input", ColumnKind::Text),
+        ("stored_at", ColumnKind::Text),
+        ("study_id", ColumnKind::Integer),
+        ("item_id", ColumnKind::Integer),
+        ("role", ColumnKind::Text),
+        ("expects", ColumnKind::Text),
     ];
 }
 
-const LABELS: &str = "select answer.*, run.task, run.seed, query.id as query_id, query.session, query.position,
+const LABELS: &str = "select answer.rowid as place, answer.*, run.task, run.seed, query.id as query_id, query.session, query.position,
         iif(run.study_id is null, run.method, iif(study.state = 'closed', study_item.method, null)) as method,
         labeler.name as labeler, query.first_clip, query.second_clip, query.disagreement, query.stage_gap,
         a.episode as first_episode, a.start as first_start, a.len as segment_len,
@@ -165,8 +188,8 @@ const LABELS: &str = "select answer.*, run.task, run.seed, query.id as query_id,
     left join study on study.id = run.study_id
     left join study_turn on study_turn.query_id = query.id
     left join study_item on study_item.id = study_turn.item_id
-    where (answer.run_id = ?1 or run.study_id = ?2)
-    order by answer.stored_at_ms, answer.run_id, answer.kind, answer.sequence limit ?3 offset ?4";
+    where (answer.run_id = ?1 or run.study_id = ?2) and answer.rowid > ?3
+    order by answer.rowid limit ?4";
 
 fn read(row: &SqliteRow) -> Result<Label, StoreError> {
     Ok(Label {
@@ -230,18 +253,18 @@ pub struct AnsweredPair {
 }
 
 impl Store {
-    /// Answers in the order in which they were stored, a page of them.
+    /// Answers in the order in which they were stored, a page of them at a time.
     ///
-    /// * `after` – the page begins behind this many
+    /// * `after` – where the page before ended, 0 for the first
     ///
     /// # Errors
     /// When the database cannot be read.
     pub async fn labels(
         &self,
         of: LabelsOf,
-        after: u32,
+        after: i64,
         limit: u32,
-    ) -> Result<Vec<Label>, StoreError> {
+    ) -> Result<LabelPage, StoreError> {
         let (run, study) = match of {
             LabelsOf::Run(run) => (Some(run.0), None),
             LabelsOf::Study(study) => (None, Some(study.0)),
@@ -249,11 +272,16 @@ impl Store {
         let rows = sqlx::query(LABELS)
             .bind(run)
             .bind(study)
-            .bind(limit)
             .bind(after)
+            .bind(limit)
             .fetch_all(self.readers())
             .await?;
-        rows.iter().map(read).collect()
+        let is_full = rows.len() == limit as usize;
+        let last = rows.last().filter(|_| is_full);
+        Ok(LabelPage {
+            labels: rows.iter().map(read).collect::<Result<_, _>>()?,
+            next: last.map(|row| row.try_get("place")).transpose()?,
+        })
     }
 
     /// The newest answered queries that were shown as clips, newest first.

@@ -177,7 +177,8 @@ impl Store {
         })
     }
 
-    /// Which segment a labeler sees on the left in an open or answered lease on this query.
+    /// Which segment a labeler sees on the left in an open or answered lease on this query, or
+    /// whoever is asked where a study has planned it.
     ///
     /// # Errors
     /// When the database cannot be read.
@@ -187,8 +188,10 @@ impl Store {
         labeler: LabelerId,
     ) -> Result<Option<Which>, StoreError> {
         let row = sqlx::query(
-            "select left_is from lease join question on question.id = lease.question_id
-             where question.query_id = ? and lease.labeler_id = ? and lease.state != 'taken' limit 1",
+            "select left_is from study_turn where query_id = ?1
+             union all
+             select left_is from lease join question on question.id = lease.question_id
+             where question.query_id = ?1 and lease.labeler_id = ?2 and lease.state != 'taken' limit 1",
         )
         .bind(query.0)
         .bind(labeler.0)

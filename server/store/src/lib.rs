@@ -28,7 +28,7 @@ pub use clip::{ClipInfo, NewClip};
 pub use demonstration::{DemonstrationRow, NewDemonstration};
 pub use error::{LinkTrouble, StoreError};
 pub use event::EventRow;
-pub use label::{AnsweredPair, Label, LabelsOf};
+pub use label::{AnsweredPair, ColumnKind, Label, LabelPage, LabelsOf};
 pub use labeler::{Labeler, LabelerId};
 pub use lease::{Lease, LeaseClip, Practice, Queue};
 pub use query::{BadQuery, ClipJob, QueryId, TaskRewards};

@@ -1,21 +1,26 @@
 //! `/api/v1/runs/{id}/labels`: all answers, for statistics elsewhere.
 
-use axum::body::Body;
+use axum::body::{Body, Bytes};
 use axum::extract::{Query, State};
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde::Deserialize;
-use serde_json::Value;
-use store::Label;
+use store::LabelsOf;
+use tokio::sync::mpsc;
+use tokio_stream::wrappers::ReceiverStream;
 
 use crate::extract::Run;
+use crate::label_table::{self, TableError, TableFormat};
 use crate::problem::Problem;
 use crate::state::AppState;
 
-/// `?format=csv|jsonl`
+/// Pages that may wait for a slow reader.
+const AHEAD: usize = 2;
+
+/// `?format=csv|jsonl|parquet`
 #[derive(Deserialize, utoipa::IntoParams)]
 pub struct Format {
-    /// `csv` (unless said otherwise) or `jsonl`; the same rows and columns.
+    /// `csv` (unless said otherwise), `jsonl` or `parquet`; the same rows and columns.
     #[serde(default)]
     format: Option<String>,
 }
@@ -31,73 +36,45 @@ pub async fn export(
     Run(run): Run,
     Query(format): Query<Format>,
 ) -> Result<Response, Problem> {
-    let labels = app.store.labels(run.id).await?;
-    let (content_type, extension, text) = match format.format.as_deref() {
-        None | Some("csv") => ("text/csv; charset=utf-8", "csv", csv(&labels)),
-        Some("jsonl") => ("application/x-ndjson", "jsonl", json_lines(&labels)),
-        Some(other) => {
-            let detail = format!("There is no format '{other}'; there are csv and jsonl.");
-            return Err(Problem::bad_request(
-                StatusCode::UNPROCESSABLE_ENTITY,
-                detail,
-            ));
+    let name = format!("labels-{}", run.id);
+    exported(&app, LabelsOf::Run(run.id), &name, &format)
+}
+
+/// A table as a file to keep, sent as it is written: its length is no matter of memory.
+///
+/// # Errors
+/// An unknown format.
+pub fn exported(
+    app: &AppState,
+    of: LabelsOf,
+    name: &str,
+    format: &Format,
+) -> Result<Response, Problem> {
+    let word = format.format.as_deref().unwrap_or("csv");
+    let format = TableFormat::of(word).ok_or_else(|| {
+        let detail = format!("There is no format '{word}'; there are csv, jsonl and parquet.");
+        Problem::bad_request(StatusCode::UNPROCESSABLE_ENTITY, detail)
+    })?;
+    let (sender, pages) = mpsc::channel::<Result<Bytes, TableError>>(AHEAD);
+    let store = app.store.clone();
+    tokio::spawn(async move {
+        let take = |bytes: Vec<u8>| {
+            let sender = sender.clone();
+            async move {
+                let sent = sender.send(Ok(bytes.into())).await;
+                sent.map_err(|_| TableError::Unwanted)
+            }
+        };
+        if let Err(error) = label_table::write(&store, of, format, take).await {
+            // The connection is cut: a table that ends early must not look whole.
+            let _ = sender.send(Err(error)).await;
         }
-    };
-    let name = format!("attachment; filename=\"labels-{}.{extension}\"", run.id);
+    });
+    let file = format!("attachment; filename=\"{name}.{}\"", format.word());
     let headers = [
-        (header::CONTENT_TYPE, content_type.to_owned()),
-        (header::CONTENT_DISPOSITION, name),
+        (header::CONTENT_TYPE, format.content_type().to_owned()),
+        (header::CONTENT_DISPOSITION, file),
     ];
-    Ok((headers, Body::from(text)).into_response())
-}
-
-/// One object a line.
-pub fn json_lines(labels: &[Label]) -> String {
-    labels
-        .iter()
-        .filter_map(|label| serde_json::to_string(label).ok())
-        .fold(String::new(), |text, line| text + &line + "\n")
-}
-
-/// RFC 4180 with a header line; a value that does not exist is empty.
-pub fn csv(labels: &[Label]) -> String {
-    let mut text = String::new();
-    let columns = Label::COLUMNS;
-    text.push_str(&columns.join(","));
-    text.push_str("\r\n");
-    for label in labels {
-        let row = serde_json::to_value(label).unwrap_or_default();
-        let cells: Vec<String> = columns.iter().map(|column| cell(&row[*column])).collect();
-        text.push_str(&cells.join(","));
-        text.push_str("\r\n");
-    }
-    text
-}
-
-fn cell(value: &Value) -> String {
-    let text = match value {
-        Value::Null => return String::new(),
-        Value::String(text) => text.clone(),
-        other => other.to_string(),
-    };
-    if text.contains([',', '"', '\n', '\r']) {
-        format!("\"{}\"", text.replace('"', "\"\""))
-    } else {
-        text
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_reason_with_commas_and_quotes_stays_one_cell() {
-        assert_eq!(
-            cell(&Value::from("left, \"or\" right")),
-            "\"left, \"\"or\"\" right\""
-        );
-        assert_eq!(cell(&Value::Null), "");
-        assert_eq!(cell(&Value::from(3)), "3");
-    }
+    let body = Body::from_stream(ReceiverStream::new(pages));
+    Ok((headers, body).into_response())
 }

@@ -52,6 +52,18 @@ pub struct LeaseView {
     right: ClipView,
     /// RFC 3339; a heartbeat moves it.
     expires_at: String,
+    /// What to tell after the answer, where this is practice.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    practice: Option<PracticeView>,
+}
+
+/// What a labeler who practises is told after the answer.
+#[derive(Serialize, ToSchema)]
+pub struct PracticeView {
+    /// The right answer: `left`, `right`, `equal`, `same` or `different`.
+    expects: String,
+    /// Why.
+    because: String,
 }
 
 /// A clip to show.
@@ -286,6 +298,10 @@ fn lease_view(lease: Lease) -> LeaseView {
         left: clip_view(lease.left),
         right: clip_view(lease.right),
         expires_at: rfc3339(lease.expires_at_ms),
+        practice: lease.practice.map(|practice| PracticeView {
+            expects: practice.expects,
+            because: practice.because,
+        }),
     }
 }
 

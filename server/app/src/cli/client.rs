@@ -15,10 +15,13 @@ const REQUEST_TIMEOUT: Duration = Duration::from_secs(30);
 const RETRY_PAUSE: Duration = Duration::from_millis(250);
 
 /// A server that may be away for a while.
+#[derive(Clone)]
 pub(super) struct Client {
     agent: Agent,
     server: String,
     token: Option<String>,
+    /// `name=value` of whoever answers, as a browser sends it.
+    cookie: Option<String>,
     /// How long a server that answered once may be away.
     patience: Duration,
     has_answered: bool,
@@ -55,6 +58,7 @@ impl Client {
             agent: config.into(),
             server,
             token: None,
+            cookie: None,
             patience,
             has_answered: false,
         })
@@ -63,6 +67,22 @@ impl Client {
     /// Sends this bearer token from now on.
     pub(super) fn authorize(&mut self, token: String) {
         self.token = Some(token);
+    }
+
+    /// Does `POST path` and sends from now on the cookie that the reply sets, as the browser of a
+    /// labeler does who signs in.
+    ///
+    /// # Errors
+    /// As [`Client::send`].
+    pub(super) fn sign_in(&mut self, path: &str, body: &impl Serialize) -> anyhow::Result<()> {
+        let response = self.send(path, |client, url| {
+            client.request(client.agent.post(url)).send_json(body)
+        })?;
+        let cookie = response.headers().get("set-cookie");
+        let cookie = cookie.and_then(|cookie| cookie.to_str().ok());
+        let cookie = cookie.and_then(|cookie| cookie.split(';').next());
+        self.cookie = cookie.map(str::to_owned);
+        Ok(())
     }
 
     /// The JSON body of `GET path`.
@@ -111,8 +131,12 @@ impl Client {
     }
 
     fn request<B>(&self, request: ureq::RequestBuilder<B>) -> ureq::RequestBuilder<B> {
-        match &self.token {
+        let request = match &self.token {
             Some(token) => request.header("authorization", format!("Bearer {token}")),
+            None => request,
+        };
+        match &self.cookie {
+            Some(cookie) => request.header("cookie", cookie),
             None => request,
         }
     }
@@ -238,7 +262,7 @@ pub(super) fn path_segment(id: &str) -> anyhow::Result<&str> {
     if is_plain {
         Ok(id)
     } else {
-        Err(BadInput(format!("'{id}' is no id of a run")).into())
+        Err(BadInput(format!("'{id}' is no id")).into())
     }
 }
 

@@ -6,22 +6,25 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use anyhow::Context as _;
-use clap::ValueEnum;
-use store::{RunId, Store};
+use store::{LabelsOf, RunId, Store, StudyId};
 
 use super::BadInput;
 use super::client::{Client, path_segment};
-use crate::api::labels::{csv, json_lines};
+use crate::label_table::{self, TableFormat};
 
-/// Write a run's answers as a table, one row each, from a server or from its data folder
+/// Write the answers of a run or a study as a table, one row each, from a server or from its data folder
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   stair export --run 1 --out answers.csv
-  stair export --run 1 --format jsonl --server http://127.0.0.1:8080")]
+  stair export --run 1 --format jsonl --server http://127.0.0.1:8080
+  stair export --study 2 --format parquet --out answers.parquet")]
 pub struct Args {
     /// The run's id, as its page's address has it
-    #[arg(long, value_name = "ID")]
-    run: String,
+    #[arg(long, value_name = "ID", required_unless_present = "study")]
+    run: Option<String>,
+    /// Instead of a run: a study's number, as its page's address has it
+    #[arg(long, value_name = "ID", conflicts_with = "run")]
+    study: Option<String>,
     /// A data folder that no server holds
     #[arg(long, value_name = "DIR", default_value = "data")]
     data: PathBuf,
@@ -29,20 +32,11 @@ pub struct Args {
     #[arg(long, value_name = "URL", conflicts_with = "data")]
     server: Option<String>,
     /// What to write
-    #[arg(long, value_enum, default_value_t = Format::Csv)]
-    format: Format,
+    #[arg(long, value_enum, default_value_t = TableFormat::Csv)]
+    format: TableFormat,
     /// Where to [default: the terminal]
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-}
-
-/// The same rows and columns, written in two ways.
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum Format {
-    /// Comma-separated, with a header line.
-    Csv,
-    /// One JSON object a line.
-    Jsonl,
 }
 
 /// Runs the command.
@@ -65,37 +59,53 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
+/// What is exported: `runs` or `studies`, with the number that was typed.
+fn asked(args: &Args) -> (&'static str, &str) {
+    match (&args.study, &args.run) {
+        (Some(study), _) => ("studies", study),
+        (None, run) => ("runs", run.as_deref().unwrap_or_default()),
+    }
+}
+
 fn from_server(server: &str, args: &Args) -> anyhow::Result<Vec<u8>> {
-    let format = match args.format {
-        Format::Csv => "csv",
-        Format::Jsonl => "jsonl",
-    };
+    let (kind, id) = asked(args);
     let mut client = Client::new(server, Duration::from_secs(30))?;
     client.download(&format!(
-        "/api/v1/runs/{}/labels?format={format}",
-        path_segment(&args.run)?
+        "/api/v1/{kind}/{}/labels?format={}",
+        path_segment(id)?,
+        args.format.word()
     ))
 }
 
 fn from_folder(args: &Args) -> anyhow::Result<Vec<u8>> {
+    let (kind, id) = asked(args);
+    let what = if kind == "runs" { "run" } else { "study" };
     let unknown = || {
         BadInput(format!(
-            "there is no run {} in {}",
-            args.run,
+            "there is no {what} {id} in {}",
             args.data.display()
         ))
     };
-    let id = RunId(args.run.parse().map_err(|_| unknown())?);
-    let labels = tokio::runtime::Runtime::new()?.block_on(async {
+    let number: i64 = id.parse().map_err(|_| unknown())?;
+    tokio::runtime::Runtime::new()?.block_on(async {
         let store = open(&args.data).await?;
-        store.run(id).await?.ok_or_else(unknown)?;
-        anyhow::Ok(store.labels(id).await?)
-    })?;
-    Ok(match args.format {
-        Format::Csv => csv(&labels),
-        Format::Jsonl => json_lines(&labels),
-    }
-    .into_bytes())
+        let of = if kind == "runs" {
+            let id = RunId(number);
+            store.run(id).await?.ok_or_else(unknown)?;
+            LabelsOf::Run(id)
+        } else {
+            let id = StudyId(number);
+            store.study(id).await.map_err(|_| unknown())?;
+            LabelsOf::Study(id)
+        };
+        let mut table = Vec::new();
+        let take = |bytes: Vec<u8>| {
+            table.extend(bytes);
+            std::future::ready(Ok(()))
+        };
+        label_table::write(&store, of, args.format, take).await?;
+        anyhow::Ok(table)
+    })
 }
 
 /// Opening a store makes what is not there, so a folder without one is refused first.

@@ -10,6 +10,10 @@ use lab::study::{READY, StudyFile};
 
 use super::{BadInput, say};
 
+mod answer;
+mod remote;
+mod report;
+
 /// Studies with people, from one file each
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -27,28 +31,59 @@ enum Action {
         /// A file, or the name of a ready study: task-1, task-1-demo
         file: PathBuf,
     },
+    Prepare(remote::PrepareArgs),
+    Open(remote::OpenArgs),
+    Invite(remote::InviteArgs),
+    Status(remote::StatusArgs),
+    Close(remote::CloseArgs),
+    Answer(answer::Args),
+    Report(report::Args),
 }
 
 /// Runs the command.
 ///
 /// # Errors
-/// [`BadInput`] names each mistake of a file with its line.
+/// [`BadInput`] names each mistake of a file with its line; what a server refuses.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
-    let Action::Check { file } = &args.action;
-    say(&described(&read(file)?))?;
+    match &args.action {
+        Action::Check { file } => say(&described(&read(file)?.study))?,
+        Action::Prepare(args) => remote::prepare(args)?,
+        Action::Open(args) => remote::open(args)?,
+        Action::Invite(args) => remote::invite(args)?,
+        Action::Status(args) => remote::status(args)?,
+        Action::Close(args) => remote::close(args)?,
+        Action::Answer(args) => answer::run(args)?,
+        Action::Report(args) => report::run(args)?,
+    }
     Ok(ExitCode::SUCCESS)
 }
 
+/// A study as a server takes it.
+struct Read {
+    study: StudyFile,
+    text: String,
+    /// From which query sets are named.
+    folder: PathBuf,
+    /// The ready study that it is.
+    ready: Option<&'static str>,
+}
+
 /// The study in a file, or the ready one of that name.
-fn read(path: &Path) -> anyhow::Result<StudyFile> {
+fn read(path: &Path) -> anyhow::Result<Read> {
     let name = path.display().to_string();
     let ready = READY.iter().find(|(ready, _)| *ready == name);
+    let ready = ready.filter(|_| !path.exists());
     let text = match ready {
-        Some((_, text)) if !path.exists() => (*text).to_owned(),
-        _ => std::fs::read_to_string(path).map_err(|error| unreadable(&name, &error))?,
+        Some((_, text)) => (*text).to_owned(),
+        None => std::fs::read_to_string(path).map_err(|error| unreadable(&name, &error))?,
     };
     let folder = path.parent().unwrap_or(Path::new(""));
-    StudyFile::parse(&name, &text, folder).map_err(BadInput::from_error)
+    Ok(Read {
+        study: StudyFile::parse(&name, &text, folder).map_err(BadInput::from_error)?,
+        text,
+        folder: std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned()),
+        ready: ready.map(|(name, _)| *name),
+    })
 }
 
 fn unreadable(name: &str, error: &std::io::Error) -> BadInput {
@@ -90,14 +125,14 @@ mod tests {
 
     #[test]
     fn a_ready_study_is_described_by_its_name() {
-        let told = described(&read(Path::new("task-1")).unwrap());
+        let told = described(&read(Path::new("task-1")).unwrap().study);
         assert!(told.contains("each answers 80 pairs"), "{told}");
         assert!(told.contains("door-open, drawer-open"), "{told}");
     }
 
     #[test]
     fn a_file_that_is_not_there_is_answered_with_the_ready_study_that_was_meant() {
-        let told = read(Path::new("task-1-dmeo")).unwrap_err();
+        let told = read(Path::new("task-1-dmeo")).err().unwrap();
         assert!(told.is::<BadInput>() && told.to_string().contains("'task-1-demo'"));
     }
 
@@ -106,7 +141,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("mine.toml");
         std::fs::write(&path, "title = \"\"\ntasks = [\"windowopen\"]\n").unwrap();
-        let told = read(&path).unwrap_err().to_string();
+        let told = read(&path).err().unwrap().to_string();
         assert!(told.contains("mine.toml: line 1: `title` must say something\n"));
         assert!(
             told.contains("line 2: there is no task 'windowopen'; did you mean 'window-open'?")

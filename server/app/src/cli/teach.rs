@@ -82,7 +82,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn new_token(client: &mut Client, run: &str) -> anyhow::Result<String> {
+pub(super) fn new_token(client: &mut Client, run: &str) -> anyhow::Result<String> {
     let told = client.post(&format!("{run}/teacher-tokens"), &json!({}))?;
     told["token"]
         .as_str()
@@ -101,16 +101,16 @@ struct Remote {
 /// The part of a lease that a program needs.
 #[derive(Deserialize)]
 #[expect(clippy::struct_field_names, reason = "the names of the API's fields")]
-struct Lease {
-    lease_id: Id,
-    query_id: Id,
-    question: String,
+pub(super) struct Lease {
+    pub(super) lease_id: Id,
+    pub(super) query_id: Id,
+    pub(super) question: String,
 }
 
 /// Ids are opaque: numbers or strings.
 #[derive(Deserialize)]
 #[serde(untagged)]
-enum Id {
+pub(super) enum Id {
     Number(i64),
     Text(String),
 }
@@ -126,7 +126,7 @@ impl std::fmt::Display for Id {
 
 /// Ground truth about a query, as this teacher's sides show it.
 #[derive(Deserialize)]
-struct TaskRewards {
+pub(super) struct TaskRewards {
     left: Vec<f64>,
     right: Vec<f64>,
     left_is: Which,
@@ -213,7 +213,7 @@ fn show(bar: &ProgressBar, told: &Value) {
     );
 }
 
-fn preference(judge: &dyn Judge, truth: TaskRewards) -> Value {
+pub(super) fn preference(judge: &dyn Judge, truth: TaskRewards) -> Value {
     let left_is = truth.left_is;
     let (first, second) = match left_is {
         Which::First => (truth.left, truth.right),
@@ -240,7 +240,7 @@ fn preference(judge: &dyn Judge, truth: TaskRewards) -> Value {
     }
 }
 
-fn same_stage(truth: &TaskRewards) -> Value {
+pub(super) fn same_stage(truth: &TaskRewards) -> Value {
     match truth.same_stage {
         Some(true) => json!({"answer": "same"}),
         Some(false) => json!({"answer": "different"}),

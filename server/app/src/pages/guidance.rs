@@ -20,13 +20,23 @@ pub struct Guidance {
 
 /// The guidance for a task.
 pub fn guidance(task: &str) -> Guidance {
+    guidance_with("", task)
+}
+
+/// A study's own words, then the guidance for a task.
+pub fn guidance_with(words: &str, task: &str) -> Guidance {
     let text = TEXTS
         .iter()
         .find(|(name, _)| *name == task)
         .map_or(ANY, |(_, text)| text);
+    let text = if words.trim().is_empty() {
+        text.to_owned()
+    } else {
+        format!("{}\n\n{text}", words.trim())
+    };
     Guidance {
-        html: to_html(text),
-        sha256: format!("{:x}", Sha256::digest(text)),
+        html: to_html(&text),
+        sha256: format!("{:x}", Sha256::digest(&text)),
     }
 }
 

@@ -4,13 +4,15 @@ use askama::Template;
 use axum::extract::{Form, State};
 use axum::http::{HeaderMap, header};
 use axum::response::{IntoResponse as _, Redirect, Response};
+use domain::query::Question;
 use serde::Deserialize;
-use store::RunRow;
+use store::{RunRow, StudyRow};
 
-use super::guidance::guidance;
+use super::guidance::{Guidance, guidance, guidance_with};
 use super::{show, thousands, title};
 use crate::api::labelers;
 use crate::extract::{Run, labeler};
+use crate::live::parse_study;
 use crate::problem::Problem;
 use crate::state::AppState;
 
@@ -35,6 +37,9 @@ struct LabelPage {
     labels: u32,
     /// Answers at most.
     budget: u32,
+    /// `preference`, or `same_stage` where that is all that is asked.
+    question: &'static str,
+    is_study: bool,
 }
 
 #[derive(Template)]
@@ -50,16 +55,29 @@ pub struct NameForm {
     name: String,
 }
 
-/// `GET /runs/{id}/label`; asks for a name first where this browser has none.
+/// `GET /runs/{id}/label`; asks for a name first where this browser has none. Questions of a
+/// study are for the labeler who sits there.
 ///
 /// # Errors
-/// A run that does not exist; a store that cannot be read.
+/// A run that does not exist, or somebody else's; a store that cannot be read.
 pub async fn page(
     State(app): State<AppState>,
     Run(run): Run,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
-    if labeler(&app, &headers).await?.is_none() {
+    let labeler = labeler(&app, &headers).await?;
+    if let Some(study) = run.study {
+        let who = labeler.ok_or_else(Problem::no_seat)?;
+        let seat = app.store.seat_of(who.id).await?;
+        let (study, _, parts) = seat
+            .filter(|(row, _, _)| row.id == study)
+            .ok_or_else(Problem::no_seat)?;
+        if !parts.iter().any(|part| part.run == run.id) {
+            return Err(Problem::no_seat());
+        }
+        return Ok(show(&of_study(&run, &study)?));
+    }
+    if labeler.is_none() {
         return Ok(show(&NamePage {
             run: run.id.to_string(),
         }));
@@ -81,16 +99,33 @@ pub async fn sign_in(
     Ok(([(header::SET_COOKIE, cookie)], to).into_response())
 }
 
+/// The page with the study's own words above the task's.
+fn of_study(run: &RunRow, study: &StudyRow) -> Result<LabelPage, Problem> {
+    let file = parse_study(study).map_err(|error| Problem::unusable_study(error.to_string()))?;
+    let page = with_guidance(run, &guidance_with(&file.guidance, &run.task));
+    Ok(LabelPage {
+        question: match study.question {
+            Question::Preference => "preference",
+            Question::SameStage => "same_stage",
+        },
+        is_study: true,
+        ..page
+    })
+}
+
 fn filled_in(run: &RunRow) -> LabelPage {
+    with_guidance(run, &guidance(&run.task))
+}
+
+fn with_guidance(run: &RunRow, guidance: &Guidance) -> LabelPage {
     let task = sim::tasks::task(&run.task).ok();
-    let guidance = guidance(&run.task);
     LabelPage {
         run: run.id.to_string(),
         task_title: title(&run.task),
         aim: task.map_or("", |task| task.summary),
         stages: task.map_or_else(String::new, stages_in_words),
-        guidance: guidance.html,
-        guidance_sha256: guidance.sha256,
+        guidance: guidance.html.clone(),
+        guidance_sha256: guidance.sha256.clone(),
         answers: format!(
             "{} of {} answers",
             thousands(run.n_labels.into()),
@@ -98,6 +133,8 @@ fn filled_in(run: &RunRow) -> LabelPage {
         ),
         labels: run.n_labels,
         budget: run.budget,
+        question: "preference",
+        is_study: false,
     }
 }
 

@@ -16,11 +16,9 @@ pub const READY: &[(&str, &str)] = &[
 mod tests {
     use std::path::Path;
 
-    use domain::random::{Rng, Stream};
-    use sim::expert::rollout;
-
     use super::*;
-    use crate::study::{Expected, KnownPair, Player, Shot, StudyFile};
+    use crate::study::plan::play;
+    use crate::study::{Expected, KnownPair, Shot, StudyFile};
 
     fn ready() -> impl Iterator<Item = (&'static str, StudyFile)> {
         READY.iter().map(|(name, text)| {
@@ -60,16 +58,7 @@ mod tests {
 
     /// Sum of the task rewards in a shot.
     fn reward_of(task: &str, shot: Shot, len: u32) -> f64 {
-        let task = sim::tasks::task(task).unwrap();
-        let size = (task.spec)().action_size;
-        let mut rng = Rng::new(shot.seed.into(), Stream::Rollout, 0);
-        let mut act = |observation: &[f32]| match shot.player {
-            Player::Expert => task.expert.unwrap()(observation),
-            Player::Random => (0..size)
-                .map(|_| rng.uniform_in(-1.0, 1.0) as f32)
-                .collect(),
-        };
-        let played = rollout((task.make)().as_mut(), shot.seed.into(), &mut act).unwrap();
+        let played = play(sim::tasks::task(task).unwrap(), shot).unwrap();
         let window = shot.start as usize..(shot.start + len) as usize;
         played.task_rewards[window].iter().sum()
     }

@@ -174,7 +174,11 @@ async fn a_labeler_practises_first_and_meets_the_planned_pairs_with_the_planned_
     let (_, _, parts) = store.seat_of(labeler).await.unwrap().unwrap();
     assert_eq!([parts[0].is_done, parts[1].is_done], [true, false]);
 
-    let labels = store.labels(LabelsOf::Study(study), 0, 100).await.unwrap();
+    let labels = store
+        .labels(LabelsOf::Study(study), 0, 100)
+        .await
+        .unwrap()
+        .labels;
     let mut sides: BTreeMap<Option<i64>, Vec<Which>> = BTreeMap::new();
     for label in labels
         .iter()
@@ -232,7 +236,11 @@ async fn methods_are_told_only_once_the_study_is_closed_and_that_is_logged() {
     let open = store.lease(run, labeler, 1, true, 10).await.unwrap();
     assert!(open.is_empty());
     let methods = || async {
-        let labels = store.labels(LabelsOf::Study(study), 0, 100).await.unwrap();
+        let labels = store
+            .labels(LabelsOf::Study(study), 0, 100)
+            .await
+            .unwrap()
+            .labels;
         let counted = labels
             .into_iter()
             .filter(|l| l.role.as_deref() == Some("counted"));

@@ -1,0 +1,155 @@
+//! `/join`: what a study asks of a labeler, their agreement, and the way back in.
+
+use askama::Template;
+use axum::extract::{Form, Query, State};
+use axum::http::header;
+use axum::response::{IntoResponse as _, Redirect, Response};
+use serde::Deserialize;
+use store::{LinkTrouble, Secret, StoreError, now_ms};
+
+use super::markdown::to_html;
+use super::{show, title};
+use crate::api::seats;
+use crate::extract::{LABELER_COOKIE, set_cookie};
+use crate::live::parse_study;
+use crate::problem::Problem;
+use crate::state::AppState;
+
+#[derive(Template)]
+#[template(path = "join.html")]
+struct JoinPage {
+    code: String,
+    title: String,
+    /// HTML.
+    consent: String,
+    /// HTML.
+    guidance: String,
+    has_guidance: bool,
+    tasks: String,
+    n_pairs: u32,
+}
+
+#[derive(Template)]
+#[template(path = "return.html")]
+struct ReturnPage {
+    heading: &'static str,
+    /// What is wrong with the link; empty without one.
+    told: String,
+}
+
+#[derive(Template)]
+#[template(path = "welcome.html")]
+struct WelcomePage {
+    return_code: String,
+}
+
+/// `?code=…`
+#[derive(Deserialize)]
+pub struct Door {
+    code: Option<String>,
+}
+
+/// `GET /join?code=…`: opening a link uses nothing up. Without a code that works, the place to
+/// enter a return code.
+///
+/// # Errors
+/// A store that cannot be read.
+pub async fn page(
+    State(app): State<AppState>,
+    Query(door): Query<Door>,
+) -> Result<Response, Problem> {
+    let Some(code) = door.code else {
+        return Ok(show(&ReturnPage {
+            heading: "Go on where you were",
+            told: String::new(),
+        }));
+    };
+    let entrance = match app.store.entrance(&Secret::brought(&code), now_ms()).await {
+        Ok(entrance) => entrance,
+        Err(StoreError::Link(trouble)) => return Ok(show(&turned_away(trouble))),
+        Err(error) => return Err(error.into()),
+    };
+    let row = app.store.study(entrance.study).await?;
+    let file = parse_study(&row).map_err(|error| Problem::unusable_study(error.to_string()))?;
+    let tasks: Vec<&str> = file.tasks.iter().map(|task| title(task)).collect();
+    let (counted, practice, extra) = file.n_pairs();
+    Ok(show(&JoinPage {
+        code,
+        consent: to_html(&file.consent),
+        guidance: to_html(&file.guidance),
+        has_guidance: !file.guidance.trim().is_empty(),
+        tasks: tasks.join(", "),
+        n_pairs: counted + practice + extra,
+        title: file.title,
+    }))
+}
+
+fn turned_away(trouble: LinkTrouble) -> ReturnPage {
+    let heading = match trouble {
+        LinkTrouble::Unknown => "This link leads nowhere",
+        LinkTrouble::Used => "This link was used already",
+        LinkTrouble::Expired => "This link has run out",
+        LinkTrouble::NotYet => "Not yet",
+        LinkTrouble::Closed => "This study is over",
+    };
+    let mut told = trouble.to_string();
+    if let Some(first) = told.get(..1).map(str::to_uppercase) {
+        told.replace_range(..1, &first);
+    }
+    ReturnPage {
+        heading,
+        told: told + ".",
+    }
+}
+
+/// The code of a link, with the labeler's agreement.
+#[derive(Deserialize)]
+pub struct EnterForm {
+    code: String,
+    #[serde(default)]
+    agrees: Option<String>,
+}
+
+/// `POST /join`: uses the link up, and shows the return code.
+///
+/// # Errors
+/// No agreement; a store that cannot be written.
+pub async fn enter(
+    State(app): State<AppState>,
+    Form(form): Form<EnterForm>,
+) -> Result<Response, Problem> {
+    let entered = seats::enter(&app, &form.code, form.agrees.is_some()).await?;
+    let cookie = set_cookie(LABELER_COOKIE, &entered.browser);
+    let page = show(&WelcomePage {
+        return_code: seats::shown(&entered.return_code),
+    });
+    Ok(([(header::SET_COOKIE, cookie)], page).into_response())
+}
+
+/// A return code as it was typed.
+#[derive(Deserialize)]
+pub struct ReturnForm {
+    code: String,
+}
+
+/// `POST /join/return`
+///
+/// # Errors
+/// A store that cannot be written.
+pub async fn come_back(
+    State(app): State<AppState>,
+    Form(form): Form<ReturnForm>,
+) -> Result<Response, Problem> {
+    match app.store.come_back(&Secret::typed(&form.code)).await {
+        Ok(browser) => {
+            let cookie = [(header::SET_COOKIE, set_cookie(LABELER_COOKIE, &browser))];
+            Ok((cookie, Redirect::to("/seat")).into_response())
+        }
+        Err(StoreError::Link(LinkTrouble::Unknown)) => Ok(show(&ReturnPage {
+            heading: "Go on where you were",
+            told: "That is no return code. It has twelve letters and digits; dashes and capitals do not matter.".to_owned(),
+        })),
+        Err(StoreError::Link(trouble)) => Ok(show(&turned_away(trouble))),
+        Err(error) => Err(error.into()),
+    }
+}

@@ -1,0 +1,240 @@
+//! Studies over HTTP: from a file to exported answers, and every link that does not work.
+
+use serde_json::{Value, json};
+
+use crate::stories::server_process::{PATIENCE, ServerProcess};
+use crate::support::Client;
+
+/// A small study of the small task: six pairs, one practice, one check, one repeat.
+pub(crate) const SMALL: &str = r#"
+title = "Which is better?"
+tasks = ["go-fetch-return"]
+question = "QUESTION"
+labels_per_task = 6
+segment_len = 10
+labelers_per_item = 2
+repeats_per_task = 1
+consent = "You may stop at any time."
+
+[source]
+kind = "expert"
+start_before = 60
+episodes = 4
+
+[[practice]]
+task = "go-fetch-return"
+first = { policy = "random", start = 0 }
+second = { policy = "expert", start = 20 }
+expects = "RIGHT"
+because = "One of them goes about it."
+
+[[check]]
+task = "go-fetch-return"
+first = { policy = "expert", seed = 3, start = 20 }
+second = { policy = "random", seed = 3, start = 0 }
+expects = "WRONG"
+"#;
+
+/// The small study with one of both questions.
+pub(crate) fn small(question: &str) -> String {
+    let [right, wrong] = match question {
+        "preference" => ["second", "first"],
+        _ => ["different", "different"],
+    };
+    let text = SMALL.replace("QUESTION", question);
+    text.replace("RIGHT", right).replace("WRONG", wrong)
+}
+
+/// A server with a study that is open.
+pub(crate) struct Open {
+    /// Held so that it runs.
+    pub(crate) server: ServerProcess,
+    pub(crate) researcher: Client,
+    pub(crate) path: String,
+    _folder: tempfile::TempDir,
+}
+
+impl Open {
+    pub(crate) fn start(question: &str) -> Self {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let server = ServerProcess::start(folder.path());
+        let researcher = Client::stranger_of(&server);
+        let made = researcher
+            .send(
+                "POST",
+                "/api/v1/studies",
+                Some(&json!({"text": small(question)})),
+            )
+            .expect(201)
+            .json();
+        let path = format!("/api/v1/studies/{}", made["id"]);
+        let started = std::time::Instant::now();
+        loop {
+            let study = researcher.send("GET", &path, None).expect(200).json();
+            match study["state"].as_str() {
+                Some("ready") => break,
+                Some("preparing") => assert!(started.elapsed() < PATIENCE, "{study}"),
+                _ => panic!("{study}"),
+            }
+            std::thread::sleep(std::time::Duration::from_millis(50));
+        }
+        researcher
+            .send("POST", &format!("{path}/open"), Some(&json!({})))
+            .expect(200);
+        Self {
+            server,
+            researcher,
+            path,
+            _folder: folder,
+        }
+    }
+
+    /// The code in a new link.
+    pub(crate) fn code(&self) -> String {
+        let path = format!("{}/invitations", self.path);
+        let links = self
+            .researcher
+            .send("POST", &path, Some(&json!({"count": 1})));
+        let links = links.expect(201).json();
+        let link = links[0]["link"].as_str().expect("a link");
+        link.split_once("code=").expect("a code").1.to_owned()
+    }
+
+    /// The browser of a labeler who has agreed, and their run.
+    pub(crate) fn labeler(&self) -> Client {
+        let body = json!({"code": self.code(), "agrees": true});
+        let reply = self
+            .researcher
+            .send("POST", "/api/v1/join", Some(&body))
+            .expect(201);
+        let labeler = self.researcher.with_cookie_of(&reply);
+        let seat = labeler.send("GET", "/api/v1/seat", None).expect(200).json();
+        labeler.on_run(&seat["parts"][0]["run_id"].to_string())
+    }
+
+    pub(crate) fn close(&self) {
+        let path = format!("{}/close", self.path);
+        self.researcher
+            .send("POST", &path, Some(&json!({})))
+            .expect(200);
+    }
+
+    /// The rows of all answers.
+    pub(crate) fn labels(&self) -> Vec<Value> {
+        let path = format!("{}/labels?format=jsonl", self.path);
+        let text = self.researcher.send("GET", &path, None).expect(200).text;
+        let rows = text.lines().map(serde_json::from_str);
+        rows.collect::<Result<_, _>>().expect("JSON lines")
+    }
+}
+
+/// Answers everything with one word; returns what was asked.
+fn answer_all(labeler: &Client, word: &str) -> Vec<Value> {
+    let mut asked = Vec::new();
+    while let Some(lease) = labeler.leases(1).first() {
+        let reply = labeler.answers(lease, &json!({"answer": word}));
+        reply.expect(201);
+        asked.push(lease.clone());
+    }
+    asked
+}
+
+#[test]
+fn a_study_is_answered_closed_and_exported_with_what_belongs_to_each_answer() {
+    let study = Open::start("preference");
+    let labeler = study.labeler();
+    let asked = answer_all(&labeler, "left");
+    assert_eq!(asked.len(), 9, "practice, six pairs, a check, a repeat");
+    assert_eq!(
+        asked[0]["practice"]["because"],
+        "One of them goes about it."
+    );
+    assert!(asked[1..].iter().all(|lease| lease["practice"].is_null()));
+    let seat = labeler.send("GET", "/api/v1/seat", None).expect(200).json();
+    assert_eq!(seat["parts"][0]["is_done"], true);
+    study.close();
+
+    let labels = study.labels();
+    let n_of = |role: &str| labels.iter().filter(|row| row["role"] == role).count();
+    assert_eq!(
+        ["practice", "counted", "check", "repeat"].map(n_of),
+        [1, 6, 1, 1]
+    );
+    let lefts = |which: &str| {
+        let counted = labels.iter().filter(|row| row["role"] == "counted");
+        counted.filter(|row| row["left_is"] == which).count()
+    };
+    assert!(lefts("first").abs_diff(lefts("second")) <= 1);
+    let figure = format!("{}/figures/preference-scatter.svg", study.path);
+    let svg = study.researcher.send("GET", &figure, None).expect(200);
+    assert!(svg.text.starts_with("<svg"), "{}", &svg.text[..80]);
+    let late = labeler.send("POST", &labeler.leases_path(), Some(&json!({"count": 1})));
+    assert!(late.expect(409).text.contains("takes no answers"));
+}
+
+#[test]
+fn a_link_that_does_not_work_says_why() {
+    let study = Open::start("same_stage");
+    let join = |code: &str, agrees: bool| {
+        let body = json!({"code": code, "agrees": agrees});
+        study.researcher.send("POST", "/api/v1/join", Some(&body))
+    };
+    let code = study.code();
+    join(&"0".repeat(64), true).expect(404);
+    join(&code, false).expect(422);
+    let entered = join(&code, true).expect(201).json();
+    assert!(join(&code, true).expect(410).text.contains("already"));
+
+    let back = join(entered["return_code"].as_str().expect("a code"), false).expect(201);
+    let elsewhere = study.researcher.with_cookie_of(&back);
+    let seat = elsewhere
+        .send("GET", "/api/v1/seat", None)
+        .expect(200)
+        .json();
+    assert_eq!(seat["seat"], 1, "the same place from another machine");
+    let full = format!("{}/invitations", study.path);
+    let full = study
+        .researcher
+        .send("POST", &full, Some(&json!({"count": 2})));
+    assert!(full.expect(409).text.contains("answered by 2 labelers"));
+    let second = study.code();
+    study.close();
+    assert!(join(&second, true).expect(410).text.contains("closed"));
+    let page = study
+        .researcher
+        .send("GET", &format!("/join?code={second}"), None);
+    assert!(page.expect(200).text.contains("This study is over"));
+}
+
+#[test]
+fn each_mistake_of_a_file_comes_back_with_its_line() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let server = ServerProcess::start(folder.path());
+    let researcher = Client::stranger_of(&server);
+    let text = small("preference").replace("consent", "concent");
+    let refused = researcher
+        .send("POST", "/api/v1/studies", Some(&json!({"text": text})))
+        .expect(422);
+    let detail = refused.json()["detail"].as_str().expect("words").to_owned();
+    assert!(
+        detail.contains("line 9: there is no key `concent`; did you mean 'consent'?"),
+        "{detail}"
+    );
+    researcher
+        .send("GET", "/api/v1/studies/7", None)
+        .expect(404);
+    researcher.send("GET", "/studies/none", None).expect(404);
+    researcher.send("GET", "/seat", None).expect(404);
+}
+
+#[test]
+fn nobody_else_reaches_a_labelers_questions() {
+    let study = Open::start("same_stage");
+    let (one, other) = (study.labeler(), study.labeler());
+    let other = other.on_run(&one.run());
+    let refused = other.send("POST", &other.leases_path(), Some(&json!({"count": 1})));
+    refused.expect(403);
+    let page = format!("/runs/{}/label", one.run());
+    other.send("GET", &page, None).expect(404);
+    one.send("GET", &page, None).expect(200);
+}

@@ -1,0 +1,102 @@
+//! A labeler of a study, from the link to the thanks, by keys only; and what the researcher sees.
+
+use serde_json::json;
+
+use super::driver::{Browser, Scheme};
+use super::labeler::answer;
+use crate::api::studies::Open;
+
+const ENTER: &str = "\u{E007}";
+
+async fn answers_everything(question: &str, key: &str) {
+    let Some(browser) = Browser::open(Scheme::Light, (1280, 900)).await else {
+        return;
+    };
+    let question = question.to_owned();
+    let study = tokio::task::spawn_blocking(move || Open::start(&question));
+    let study = study.await.expect("a study");
+    let page = |path: &str| format!("http://{}{path}", study.server.address);
+    let link = page(&format!("/join?code={}", study.code()));
+    browser.goto(&link).await;
+    browser.press(" ").await; // agrees: the box has the focus
+    browser.press(ENTER).await;
+    browser
+        .until("document.querySelector('#begin') !== null")
+        .await;
+    browser.press(ENTER).await;
+    browser
+        .until("document.querySelector('#go-on') !== null")
+        .await;
+    browser.press(ENTER).await;
+    browser
+        .until("document.querySelector('#guidance[open]') !== null")
+        .await;
+    browser.press(ENTER).await;
+
+    browser
+        .until("document.body.dataset.shown && !document.querySelector('#practice').hidden")
+        .await;
+    answer(&browser, key).await;
+    browser
+        .until("document.querySelector('#feedback[open]') !== null")
+        .await;
+    let because = browser.text("#feedback-text").await;
+    assert_eq!(because, "One of them goes about it.");
+    browser.press(ENTER).await;
+    loop {
+        browser
+            .until("document.querySelector('#seat') !== null || (document.body.dataset.stage === 'working' && document.body.dataset.shown)")
+            .await;
+        if browser
+            .value("document.querySelector('#seat') !== null")
+            .await
+            == json!(true)
+        {
+            break;
+        }
+        let before = browser.value("document.body.dataset.shown").await;
+        browser
+            .until("!document.body.dataset.shownAt || performance.now() - Number(document.body.dataset.shownAt) > 200")
+            .await;
+        browser.press(key).await;
+        browser
+            .until(&format!("document.querySelector('#seat') !== null || document.body.dataset.shown !== {before}"))
+            .await;
+    }
+    assert!(browser.text("#seat h1").await.contains("Thank you"));
+    assert_eq!(
+        study.labels().len(),
+        9,
+        "practice, six pairs, a check, a repeat"
+    );
+    let timed = study.labels();
+    let is_timed =
+        |row: &serde_json::Value| row["input"] == "key" && row["visible_ms"].as_i64() > Some(100);
+    assert!(timed.iter().all(is_timed), "{timed:?}");
+
+    study.close();
+    browser.goto(&page("/studies/1")).await;
+    browser
+        .until(
+            "document.querySelector('figure img')?.complete ?? !document.querySelector('figure')",
+        )
+        .await;
+    assert!(
+        browser
+            .text("[aria-labelledby=results-title]")
+            .await
+            .contains("checks answered right")
+    );
+    browser.goto(&link).await;
+    assert!(browser.text("h1").await.contains("over"));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_person_answers_a_study_of_preferences_by_keys_only() {
+    answers_everything("preference", "1").await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_person_answers_a_study_of_stages_by_keys_only() {
+    answers_everything("same_stage", "s").await;
+}
