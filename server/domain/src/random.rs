@@ -45,6 +45,8 @@ pub enum Stream {
     WarmStart = 18,
     /// Pairs that nobody is asked about.
     Unlabeled = 19,
+    /// Order of the states while the timestep classifier is fitted.
+    TimestepFit = 20,
     /// Tests.
     Test = 99,
 }

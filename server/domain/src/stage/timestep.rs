@@ -243,9 +243,12 @@ impl StageSum {
 /// The most likely column, the first of several, with its probability.
 fn most_likely(row: &[f32]) -> (usize, f64) {
     let columns = row.iter().copied().enumerate();
-    let (at, p) = columns.fold((0, row[0]), |best, here| {
-        if here.1 > best.1 { here } else { best }
-    });
+    let (at, p) = columns.fold(
+        (0, row[0]),
+        |best, here| {
+            if here.1 > best.1 { here } else { best }
+        },
+    );
     (at, f64::from(p))
 }
 

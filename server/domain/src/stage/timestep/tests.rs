@@ -127,10 +127,7 @@ fn any_classifier_keeps_the_bound_that_needs_no_calibration() {
         let table = StageProbabilities::new(values.collect(), n_steps).unwrap();
         for m in report(&[table]).stages {
             assert!(m.right_confidence <= m.measure + 1e-6, "{m:?}");
-            assert!(
-                m.confidence.powi(2) <= m.confidence_squared + 1e-6,
-                "{m:?}"
-            );
+            assert!(m.confidence.powi(2) <= m.confidence_squared + 1e-6, "{m:?}");
         }
     }
     // Sure of the wrong one of two steps: E[m²] is 1, and half of it can be had.
