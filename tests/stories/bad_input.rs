@@ -286,3 +286,33 @@ fn a_reader_that_has_seen_enough_is_no_error() {
         assert!(status.success(), "{arguments:?}: {status}");
     }
 }
+
+#[test]
+fn an_expert_that_nobody_wrote_and_a_task_that_is_none_are_named() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let here = folder.path();
+    let watch = |task| {
+        let of = ["experiment", "timestep-classifier", "--task"];
+        [of.as_slice(), &["go-fetch-return", task, "--out", "out"]].concat()
+    };
+    expect(
+        &watch("walker-run"),
+        here,
+        &["walker-run", "no scripted expert", "door-open"],
+    );
+    expect(
+        &watch("windowopen"),
+        here,
+        &["windowopen", "did you mean 'window-open'"],
+    );
+    assert!(!here.join("out").exists(), "nothing was begun");
+    std::fs::write(here.join("out"), "a file").expect("a file");
+    expect(&watch("door-open"), here, &["cannot make the folder out"]);
+    expect(
+        &["experiment", "timestep-clasifier", "--out", "elsewhere"],
+        here,
+        &["did you mean 'timestep-classifier'"],
+    );
+    let few = [watch("door-open"), vec!["--episodes", "1"]].concat();
+    expect(&few, here, &["--episodes", "2..=20000"]);
+}

@@ -176,3 +176,44 @@ fn a_run_that_fails_is_marked_and_stops_no_other() {
     let rows = std::fs::read_to_string(here.join("out/results.jsonl")).expect("rows");
     assert_eq!(rows.matches("\"kind\":\"failed\"").count(), 2, "{rows}");
 }
+
+#[test]
+fn an_experts_steps_are_told_apart_twice_with_the_same_bytes() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let here = folder.path();
+    let watched = |out: &str| {
+        let mut command = stair();
+        command
+            .args(["experiment", "timestep-classifier", "--out", out])
+            .args(["--task", "go-fetch-return", "--episodes", "4"])
+            .current_dir(here);
+        let said = said(command);
+        let names = [
+            "timestep-classifier.jsonl",
+            "timestep-classifier.md",
+            "timestep-classifier.svg",
+            "timestep-classifier.png",
+            "go-fetch-return.jsonl",
+            "stage-map.svg",
+        ];
+        names.map(|name| {
+            assert!(said.contains(&format!("{out}/{name}")), "{said}");
+            std::fs::read(here.join(out).join(name)).expect("a file")
+        })
+    };
+    let once = watched("once");
+    assert!(watched("again") == once, "the same bytes");
+    let row: serde_json::Value = serde_json::from_slice(&once[0]).expect("JSON");
+    assert_eq!(row["held_out"]["n_states"], 200);
+
+    let mut figure = stair();
+    let rows = ["figure", "stage-map", "once/go-fetch-return.jsonl"];
+    figure.args(rows).args(["--out", "map.svg"]);
+    figure.current_dir(here);
+    said(figure);
+    let map = std::fs::read(here.join("map.svg")).expect("a figure");
+    assert!(
+        map == once[5],
+        "the figure maker draws the same from the rows"
+    );
+}

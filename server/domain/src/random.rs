@@ -45,8 +45,10 @@ pub enum Stream {
     WarmStart = 18,
     /// Pairs that nobody is asked about.
     Unlabeled = 19,
+    /// Order of the states while the timestep classifier is fitted.
+    TimestepFit = 20,
     /// Segments and pairs of a study, and in which order a labeler meets them.
-    Study = 20,
+    Study = 21,
     /// Tests.
     Test = 99,
 }

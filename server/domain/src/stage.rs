@@ -3,8 +3,12 @@
 use thiserror::Error;
 
 mod gap;
+mod timestep;
 
 pub use gap::{GapBounds, StageGeometry, n_aligned, stage_gap};
+pub use timestep::{
+    Bin, Calibration, N_BINS, OFF_BY, STAGES, StageMeasures, TimestepReport, TimestepTally, Within,
+};
 
 /// How likely each state of one trajectory belongs to each stage: F(s, ω), `[T × N]`.
 #[derive(Debug, Clone, PartialEq)]
@@ -74,6 +78,34 @@ impl StageProbabilities {
         self.values.len() / self.n_stages
     }
 
+    /// The same with stages in a row merged into fewer of about equal length, whose probabilities
+    /// add up; stage j of N becomes ⌈(j + 1) · n/N⌉ − 1 of n.
+    ///
+    /// Source: STAIR, appendix, the aggregated classifier: a step's stage is ⌈t/(T/n)⌉.
+    ///
+    /// # Panics
+    /// When there are to be more stages than there are, or none.
+    #[must_use]
+    pub fn merged(&self, n_stages: usize) -> Self {
+        let mut values = vec![0.0; self.n_states() * n_stages];
+        let stages: Vec<usize> = (0..self.n_stages)
+            .map(|stage| merged_stage(stage, self.n_stages, n_stages))
+            .collect();
+        for (row, merged) in self
+            .values
+            .chunks_exact(self.n_stages)
+            .zip(values.chunks_exact_mut(n_stages))
+        {
+            for (p, &stage) in row.iter().zip(&stages) {
+                merged[stage] += p;
+            }
+            for p in merged {
+                *p = p.min(1.0); // rounding may have passed it
+            }
+        }
+        Self { values, n_stages }
+    }
+
     /// The probabilities of one state, `[N]`.
     ///
     /// # Panics
@@ -81,6 +113,15 @@ impl StageProbabilities {
     pub fn row(&self, step: usize) -> &[f32] {
         &self.values[step * self.n_stages..][..self.n_stages]
     }
+}
+
+/// Which of `n` merged stages one of `n_stages` belongs to, from 0.
+fn merged_stage(stage: usize, n_stages: usize, n: usize) -> usize {
+    assert!(
+        (1..=n_stages).contains(&n),
+        "{n_stages} stages cannot be merged into {n}"
+    );
+    ((stage + 1) * n).div_ceil(n_stages) - 1
 }
 
 /// A trajectory cut into consecutive stages.
@@ -230,6 +271,21 @@ mod tests {
         let table = StageProbabilities::new(vec![0.25, 0.5, 0.75], 1).unwrap();
         let found = best_segmentation(&table);
         assert_eq!((found.value, found.starts), (0.5, vec![0]));
+    }
+
+    /// Seven steps into three stages: ⌈3/7⌉, ⌈6/7⌉ = 1; ⌈9/7⌉, ⌈12/7⌉ = 2; ⌈15/7⌉ … ⌈21/7⌉ = 3.
+    #[test]
+    fn merged_stages_are_the_papers_and_their_probabilities_add_up() {
+        let stages: Vec<usize> = (0..7).map(|step| merged_stage(step, 7, 3)).collect();
+        assert_eq!(stages, [0, 0, 1, 1, 2, 2, 2]);
+        let row = vec![0.05, 0.1, 0.15, 0.2, 0.25, 0.05, 0.2];
+        let table = StageProbabilities::new(row, 7).unwrap();
+        let merged = table.merged(3);
+        for (found, expected) in merged.row(0).iter().zip([0.15, 0.35, 0.5]) {
+            assert!((found - expected).abs() < 1e-6, "{merged:?}");
+        }
+        assert_eq!(table.merged(7), table);
+        assert!((table.merged(1).row(0)[0] - 1.0).abs() < 1e-6);
     }
 
     #[test]

@@ -1,18 +1,20 @@
-//! Experiments: those that need no simulation, and grids of runs with their results and reports.
+//! Experiments: those that need no simulation, the classifier of an expert's time steps, and grids
+//! of runs with their results and reports.
 //!
-//! Those without simulation are pure: the same settings give the same bytes, on any number of
-//! threads. A report is pure in its rows.
+//! The same settings give the same bytes, on any number of threads; grids aside, whose runs also
+//! tell the time they took. A report is pure in its rows.
 
 use std::num::NonZeroUsize;
 
 use crate::config::{ConfigError, unknown};
-use crate::figure::FigureError;
+use crate::figure::{FigureError, Source};
 
 pub mod abstract_mdp;
 pub mod grid;
 pub mod query_counts;
 pub mod report;
 pub mod results;
+pub mod timestep_classifier;
 
 /// How an experiment is run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -27,9 +29,21 @@ pub struct Settings {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Artifact {
     /// Its name, without a folder.
-    pub name: &'static str,
+    pub name: String,
     /// What it holds.
     pub text: String,
+}
+
+impl Artifact {
+    fn new(name: impl Into<String>, text: String) -> Self {
+        let name = name.into();
+        Self { name, text }
+    }
+
+    /// Rows, under the name by which figures call them.
+    fn of(rows: Source) -> Self {
+        Self::new(rows.name, rows.text)
+    }
 }
 
 /// A line of the registry.
@@ -42,15 +56,16 @@ pub struct ExperimentEntry {
     pub run: fn(Settings) -> Result<Vec<Artifact>, FigureError>,
 }
 
-/// All experiments.
+/// All experiments without simulation.
 pub const EXPERIMENTS: &[ExperimentEntry] = &[abstract_mdp::ENTRY, query_counts::ENTRY];
 
-/// The experiment of that name.
+/// The experiment without simulation of that name.
 ///
 /// # Errors
-/// Names the nearest right one.
+/// Names the nearest right one, of all experiments.
 pub fn find(name: &str) -> Result<&'static ExperimentEntry, ConfigError> {
     let known = EXPERIMENTS.iter().map(|e| e.name);
+    let known = known.chain([timestep_classifier::NAME]);
     let found = EXPERIMENTS.iter().find(|e| e.name == name);
     found.ok_or_else(|| unknown("experiment", name, known))
 }

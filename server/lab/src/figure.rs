@@ -19,6 +19,7 @@ mod same_stage_bars;
 mod seeds;
 mod stage_gaps;
 mod stage_map;
+mod timestep_classifier;
 
 pub use curves::points as curve_points;
 pub use preferences::{PreferenceRow, Preferred};
@@ -72,6 +73,7 @@ pub const FIGURES: &[FigureEntry] = &[
     same_stage_bars::ENTRY,
     stage_map::ENTRY,
     stage_gaps::ENTRY,
+    timestep_classifier::ENTRY,
 ];
 
 /// Why a figure cannot be drawn.

@@ -1,4 +1,5 @@
-//! Learns: the agent (SAC), the reward ensemble, the temporal distance and the drive to explore.
+//! Learns: the agent (SAC), the reward ensemble, the temporal distance, the drive to explore, and
+//! to tell the step from the state.
 //!
 //! Invariants: the only crate that touches tensors; randomness only from [`domain::random`], keyed
 //! by (seed, stream, step), so that every learner resumes bit for bit from what it saves; one
@@ -19,6 +20,7 @@ pub mod reward;
 pub mod sac;
 pub mod stage;
 pub mod temporal;
+pub mod timestep;
 
 mod adam;
 mod checksum;

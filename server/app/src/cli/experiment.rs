@@ -1,5 +1,4 @@
-//! `stair experiment`: grids of runs, their reports, and the paper's experiments that need no
-//! simulation.
+//! `stair experiment`: grids of runs, their reports, and the paper's smaller experiments.
 
 use std::fmt::Write as _;
 use std::num::NonZeroUsize;
@@ -17,6 +16,7 @@ mod check;
 mod pool;
 mod report;
 mod run;
+mod timestep_classifier;
 
 /// Run an experiment, as far as it has not run yet, and report what came out
 #[derive(Debug, clap::Args)]
@@ -45,6 +45,7 @@ enum Command {
     Check(check::Args),
     List(check::ListArgs),
     Report(report::Args),
+    TimestepClassifier(timestep_classifier::Args),
 }
 
 fn after_help() -> String {
@@ -81,6 +82,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         Some(Command::Check(args)) => check::run(&args),
         Some(Command::List(_)) => check::list(),
         Some(Command::Report(args)) => report::run(&args),
+        Some(Command::TimestepClassifier(args)) => timestep_classifier::run(&args),
         None => without_simulation(&args),
     }
 }

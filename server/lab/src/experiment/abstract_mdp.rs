@@ -143,11 +143,10 @@ fn run(settings: Settings) -> Result<Vec<Artifact>, FigureError> {
         ..Request::default()
     };
     let svg = figure::make(figure::find("abstract-mdp")?, &request)?;
-    let file = |name, text| Artifact { name, text };
     Ok(vec![
-        file("abstract-mdp.jsonl", rows),
-        file("abstract-mdp.md", report::table(&outcomes)),
-        file("abstract-mdp.svg", svg),
+        Artifact::new("abstract-mdp.jsonl", rows),
+        Artifact::new("abstract-mdp.md", report::table(&outcomes)),
+        Artifact::new("abstract-mdp.svg", svg),
     ])
 }
 

@@ -80,10 +80,9 @@ fn run(settings: Settings) -> Result<Vec<Artifact>, FigureError> {
         ..Request::default()
     };
     let svg = figure::make(figure::find("query-counts")?, &request)?;
-    let file = |name, text| Artifact { name, text };
     Ok(vec![
-        file("query-counts.jsonl", rows),
-        file("query-counts.md", report::table(&asked)),
-        file("query-counts.svg", svg),
+        Artifact::new("query-counts.jsonl", rows),
+        Artifact::new("query-counts.md", report::table(&asked)),
+        Artifact::new("query-counts.svg", svg),
     ])
 }

@@ -121,10 +121,9 @@ pub fn make(files: &[RowFile], may_mix: bool) -> Result<Vec<Artifact>, ReportErr
         .flat_map(|(_, results)| results.runs)
         .collect();
     let runs = Runs { runs, failed };
-    let file = |name, text| Artifact { name, text };
     let mut artifacts = vec![
-        file("report.md", table::markdown(&runs)),
-        file("scores.csv", table::csv(&runs)),
+        Artifact::new("report.md", table::markdown(&runs)),
+        Artifact::new("scores.csv", table::csv(&runs)),
     ];
     for kind in [true, false] {
         let of_kind: Vec<&RunResult> = runs
@@ -174,10 +173,9 @@ fn curves(
         y: Some(y),
         center: Some("iqm"),
     };
-    let file = |name, text| Artifact { name, text };
     Ok([
-        file(svg, figure::make(figure::find("curves")?, &request)?),
-        file(csv, figure::curve_points(&request)?),
+        Artifact::new(svg, figure::make(figure::find("curves")?, &request)?),
+        Artifact::new(csv, figure::curve_points(&request)?),
     ])
 }
 
@@ -239,11 +237,10 @@ fn stage_gaps(files: &[RowFile]) -> Result<Vec<Artifact>, FigureError> {
         sources: &sources,
         ..Request::default()
     };
-    let file = |name, text| Artifact { name, text };
     match figure::make(figure::find("stage-gaps")?, &request) {
         Ok(svg) => Ok(vec![
-            file("stage-gaps.svg", svg),
-            file("stage-gaps.csv", figure::stage_gap_points(&request)?),
+            Artifact::new("stage-gaps.svg", svg),
+            Artifact::new("stage-gaps.csv", figure::stage_gap_points(&request)?),
         ]),
         Err(FigureError::NoRows { .. }) => Ok(Vec::new()),
         Err(error) => Err(error),

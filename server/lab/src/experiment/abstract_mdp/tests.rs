@@ -109,7 +109,7 @@ fn aligned_queries_learn_the_same_whatever_the_bias() {
 #[test]
 fn the_run_has_rows_a_table_and_a_figure() {
     let files = run(settings(2, 2)).unwrap();
-    let names: Vec<&str> = files.iter().map(|f| f.name).collect();
+    let names: Vec<&str> = files.iter().map(|f| f.name.as_str()).collect();
     assert_eq!(
         names,
         ["abstract-mdp.jsonl", "abstract-mdp.md", "abstract-mdp.svg"]

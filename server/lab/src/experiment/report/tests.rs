@@ -201,7 +201,10 @@ fn a_share_of_success_is_reached_at_the_first_evaluation_with_it() {
 fn the_report_has_tables_curves_and_points_the_same_each_time() {
     let files = [file("rows.jsonl", three_seeds_each())];
     let artifacts = make(&files, false).unwrap();
-    let names: Vec<&str> = artifacts.iter().map(|artifact| artifact.name).collect();
+    let names: Vec<&str> = artifacts
+        .iter()
+        .map(|artifact| artifact.name.as_str())
+        .collect();
     assert_eq!(
         names,
         [
