@@ -6,12 +6,16 @@
 
 mod file;
 mod known_pair;
+mod query_set;
 mod ready;
 mod section;
 mod source;
 
 pub use file::StudyFile;
 pub use known_pair::{Expected, KnownPair, Player, Shot};
+pub use query_set::{
+    DEFAULT_QUERIES, PackedQueries, PackedQuery, PackedSegment, QuerySetError, spread,
+};
 pub use ready::READY;
 pub use section::{Mistake, Mistakes};
 pub use source::{QuerySet, Source};

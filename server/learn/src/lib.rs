@@ -12,6 +12,7 @@
 
 pub mod beliefs;
 pub mod checkpoint;
+pub mod checksum;
 pub mod device;
 pub mod exploration;
 pub mod replay;
@@ -21,7 +22,6 @@ pub mod stage;
 pub mod temporal;
 
 mod adam;
-mod checksum;
 mod error;
 mod init;
 mod kernel;
