@@ -15,6 +15,7 @@ use learn::temporal::TemporalConfig;
 use crate::nearest::nearest;
 
 mod check;
+mod command;
 mod layers;
 mod presets;
 

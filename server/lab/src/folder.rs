@@ -161,6 +161,35 @@ impl RunFolder {
         Ok(steps)
     }
 
+    /// What `read` makes of the newest checkpoint that it can read, else of `last`.
+    ///
+    /// # Errors
+    /// When there is none, with what was wrong with each.
+    pub(crate) fn newest<T>(
+        &self,
+        last: Option<PathBuf>,
+        read: impl Fn(&Path) -> Result<T, RunError>,
+    ) -> Result<T, RunError> {
+        let mut reasons = Vec::new();
+        let checkpoints = self.checkpoints()?.into_iter().rev();
+        let checkpoints = checkpoints.map(|step| self.checkpoint_path(step));
+        for path in checkpoints.chain(last) {
+            match read(&path) {
+                Ok(found) => return Ok(found),
+                Err(error) => reasons.push(error.to_string()),
+            }
+        }
+        let reasons = if reasons.is_empty() {
+            "there is none".into()
+        } else {
+            reasons.join("; ")
+        };
+        Err(RunError::NoCheckpoint {
+            folder: self.root.clone(),
+            reasons,
+        })
+    }
+
     /// Where a finished run leaves its policy: small, and all that looking at it takes.
     pub(crate) fn policy_path(&self) -> PathBuf {
         self.root.join("policy.stair")

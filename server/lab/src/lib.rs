@@ -13,6 +13,7 @@ pub mod message;
 pub mod method;
 pub mod nearest;
 pub mod policy;
+pub mod record;
 pub mod run;
 pub mod study;
 

@@ -28,25 +28,8 @@ impl TrainedPolicy {
             return Self::read(path);
         }
         let (folder, _) = RunFolder::open(path)?;
-        let mut reasons = Vec::new();
-        let checkpoints = folder.checkpoints()?.into_iter().rev();
-        let checkpoints = checkpoints.map(|step| folder.checkpoint_path(step));
         let left = Some(folder.policy_path()).filter(|path| path.exists());
-        for path in checkpoints.chain(left) {
-            match Self::read(&path) {
-                Ok(policy) => return Ok(policy),
-                Err(error) => reasons.push(error.to_string()),
-            }
-        }
-        let reasons = if reasons.is_empty() {
-            "there is none".into()
-        } else {
-            reasons.join("; ")
-        };
-        Err(RunError::NoCheckpoint {
-            folder: path.to_owned(),
-            reasons,
-        })
+        folder.newest(left, Self::read)
     }
 
     fn read(path: &Path) -> Result<Self, RunError> {

@@ -78,6 +78,11 @@ impl Preferences {
         self.0.values().map(|a| a.query).collect()
     }
 
+    /// All queries so far with their names, in the order of these.
+    pub(crate) fn keyed(&self) -> Vec<(QueryKey, Query)> {
+        self.0.values().map(|a| (a.key, a.query)).collect()
+    }
+
     /// Preferences so far: what the budget counts.
     pub(crate) fn n_preferred(&self) -> u32 {
         self.0

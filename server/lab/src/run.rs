@@ -63,8 +63,9 @@ pub struct Run {
 
 /// Counters that a checkpoint keeps.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
-struct Progress {
-    step: u64,
+pub(crate) struct Progress {
+    /// Environment steps taken.
+    pub(crate) step: u64,
     n_sessions: u32,
     n_fits: u32,
     consumed_sequence: u64,

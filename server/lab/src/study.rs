@@ -7,6 +7,7 @@
 mod file;
 mod known_pair;
 mod plan;
+mod query_set;
 mod ready;
 mod section;
 mod source;
@@ -14,6 +15,9 @@ mod source;
 pub use file::StudyFile;
 pub use known_pair::{Expected, KnownPair, Player, Shot};
 pub use plan::{PairRole, PlanError, PlannedPair, plan};
+pub use query_set::{
+    DEFAULT_QUERIES, PackedQueries, PackedQuery, PackedSegment, QuerySetError, spread,
+};
 pub use ready::READY;
 pub use section::{Mistake, Mistakes};
 pub use source::{QuerySet, Source};

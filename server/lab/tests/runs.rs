@@ -5,6 +5,7 @@
 )]
 
 mod methods;
+mod query_sets;
 
 use std::path::PathBuf;
 use std::sync::mpsc::channel;

@@ -2,14 +2,21 @@
 
 /// A sum that can be taken over a stream in pieces; the pieces' borders do not matter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Checksum {
+pub struct Checksum {
     state: u64,
     tail: u64,
     n_bytes: u64,
 }
 
+impl Default for Checksum {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 impl Checksum {
-    pub(crate) fn new() -> Self {
+    /// Of no bytes yet.
+    pub fn new() -> Self {
         Self {
             state: 0x9E37_79B9_7F4A_7C15,
             tail: 0,
@@ -17,29 +24,31 @@ impl Checksum {
         }
     }
 
-    pub(crate) fn of(bytes: &[u8]) -> u64 {
+    /// Of all bytes at once.
+    pub fn of(bytes: &[u8]) -> u64 {
         let mut sum = Self::new();
         sum.update(bytes);
         sum.value()
     }
 
-    pub(crate) fn update(&mut self, mut bytes: &[u8]) {
+    /// Takes the next piece in.
+    pub fn update(&mut self, mut bytes: &[u8]) {
         while !self.n_bytes.is_multiple_of(8) && !bytes.is_empty() {
             self.push(bytes[0]);
             bytes = &bytes[1..];
         }
-        let mut words = bytes.chunks_exact(8);
-        for word in &mut words {
-            let word: [u8; 8] = word.try_into().expect("chunks of eight bytes");
-            self.absorb(u64::from_le_bytes(word));
+        let (words, rest) = bytes.as_chunks();
+        for word in words {
+            self.absorb(u64::from_le_bytes(*word));
             self.n_bytes += 8;
         }
-        for &byte in words.remainder() {
+        for &byte in rest {
             self.push(byte);
         }
     }
 
-    pub(crate) fn value(&self) -> u64 {
+    /// The sum so far. Any change within one aligned word of eight bytes changes it.
+    pub fn value(&self) -> u64 {
         let mut end = *self;
         end.absorb(self.tail);
         end.absorb(self.n_bytes);

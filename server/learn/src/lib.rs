@@ -13,6 +13,7 @@
 
 pub mod beliefs;
 pub mod checkpoint;
+pub mod checksum;
 pub mod device;
 pub mod exploration;
 pub mod replay;
@@ -23,7 +24,6 @@ pub mod temporal;
 pub mod timestep;
 
 mod adam;
-mod checksum;
 mod error;
 mod init;
 mod kernel;

@@ -6,11 +6,14 @@ use std::path::Path;
 
 use domain::environment::{EnvError, TaskReward};
 use domain::episode::{EpisodeId, Segment, SegmentRecord};
+use domain::query::QueryKey;
 use domain::random::{Rng, Stream};
 use sim::expert::{Rollout, rollout};
 use sim::tasks::Task;
 
-use super::{Expected, KnownPair, Player, Shot, Source, StudyFile};
+use super::{
+    Expected, KnownPair, PackedSegment, Player, QuerySet, QuerySetError, Shot, Source, StudyFile, spread,
+};
 
 /// Keys of [`Stream::Study`] from here on draw segments; smaller ones lay out labelers' turns.
 const FIRST_KEY: u64 = 1 << 32;
@@ -67,9 +70,29 @@ pub enum PlanError {
         /// What the environment said.
         reason: EnvError,
     },
-    /// A study of queries that methods chose.
-    #[error("this version of the program prepares studies of experts' segments only")]
-    Queries,
+    /// A query set that cannot be had.
+    #[error(transparent)]
+    QuerySet(#[from] QuerySetError),
+    /// A query set with segments of another length than the study's.
+    #[error("{path} holds segments of {found} steps, but the study says {expected}")]
+    OtherLength {
+        /// The file or folder.
+        path: String,
+        /// Steps of its segments.
+        found: u32,
+        /// The study's `segment_len`.
+        expected: u32,
+    },
+    /// A query set with fewer queries than the study asks for.
+    #[error("{path} holds {found} queries, but the study asks each labeler about {expected} of them")]
+    TooFew {
+        /// The file or folder.
+        path: String,
+        /// Its queries.
+        found: usize,
+        /// The method's share of the study's `labels_per_task`.
+        expected: usize,
+    },
     /// A task without a scripted expert.
     #[error("{0} has no scripted expert to draw segments from")]
     NoExpert(String),
@@ -126,14 +149,70 @@ fn counted(
     study: &StudyFile,
     task: &Task,
     number: usize,
-    _folder: &Path,
+    folder: &Path,
 ) -> Result<Vec<PlannedPair>, PlanError> {
     match &study.source {
         Source::Expert {
             start_before,
             n_episodes,
         } => expert_pairs(study, task, number, (*start_before, *n_episodes)),
-        Source::Queries(_) => Err(PlanError::Queries),
+        Source::Queries(sets) => query_pairs(study, (task, number), sets, folder),
+    }
+}
+
+/// As many queries of every method's run, spread over the run, as the method chose them.
+fn query_pairs(
+    study: &StudyFile,
+    (task, number): (&Task, usize),
+    sets: &[QuerySet],
+    folder: &Path,
+) -> Result<Vec<PlannedPair>, PlanError> {
+    let methods = study.source.methods();
+    let share = study.labels_per_task as usize / methods.len().max(1);
+    let mut pairs = Vec::new();
+    for set in sets.iter().filter(|set| set.task == task.name) {
+        let queries = set.load(folder)?;
+        let path = || set.from.display().to_string();
+        if queries.len() < share {
+            return Err(PlanError::TooFew {
+                path: path(),
+                found: queries.len(),
+                expected: share,
+            });
+        }
+        let keys: Vec<QueryKey> = queries.iter().map(|query| query.key).collect();
+        for index in spread(&keys, share) {
+            let query = &queries[index];
+            let segments = [&query.first, &query.second];
+            let other = segments.iter().find(|s| s.segment.len != study.segment_len);
+            if let Some(segment) = other {
+                return Err(PlanError::OtherLength {
+                    path: path(),
+                    found: segment.segment.len,
+                    expected: study.segment_len,
+                });
+            }
+            let [first, second] = segments.map(record_of);
+            pairs.push(PlannedPair {
+                task: number,
+                role: PairRole::Counted {
+                    method: methods.iter().position(|method| *method == set.method),
+                },
+                first,
+                second,
+            });
+        }
+    }
+    Ok(pairs)
+}
+
+/// What can be seen of a segment; its task rewards are not kept in a query set.
+fn record_of(segment: &PackedSegment) -> SegmentRecord {
+    SegmentRecord {
+        segment: segment.segment,
+        poses: segment.poses.clone(),
+        task_rewards: Vec::new(),
+        stages: segment.stages.clone(),
     }
 }
 
