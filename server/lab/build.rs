@@ -11,6 +11,19 @@ fn main() {
     emit_link_arguments();
     embed_presets();
     embed_experiments();
+    embed_query_sets();
+}
+
+/// Writes `query_sets.rs`: `(path as study files have it, bytes)` of every file in
+/// `assets/studies/sets`.
+fn embed_query_sets() {
+    let mut paths = entries(&assets("studies/sets"));
+    paths.sort();
+    let entry = |path: PathBuf| {
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        format!("({:?}, include_bytes!({:?}))", format!("sets/{name}"), path.display().to_string())
+    };
+    write_table("query_sets.rs", paths.into_iter().map(entry));
 }
 
 /// Writes `presets.rs`: `(name, task or "", text)` of every file below `assets/presets`. There

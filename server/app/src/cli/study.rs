@@ -11,6 +11,7 @@ use lab::study::{READY, StudyFile};
 use super::{BadInput, say};
 
 mod answer;
+mod pack;
 mod remote;
 mod report;
 
@@ -31,6 +32,8 @@ enum Action {
         /// A file, or the name of a ready study: task-1, task-1-demo
         file: PathBuf,
     },
+    /// Pack the queries of a finished run into one small file, to be asked in studies
+    Pack(pack::Args),
     Prepare(remote::PrepareArgs),
     Open(remote::OpenArgs),
     Invite(remote::InviteArgs),
@@ -47,6 +50,7 @@ enum Action {
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     match &args.action {
         Action::Check { file } => say(&described(&read(file)?.study))?,
+        Action::Pack(args) => pack::run(args)?,
         Action::Prepare(args) => remote::prepare(args)?,
         Action::Open(args) => remote::open(args)?,
         Action::Invite(args) => remote::invite(args)?,

@@ -20,6 +20,9 @@ mod spread;
 
 pub use spread::spread;
 
+/// Sets that come with the program, named as ready studies name them.
+const READY: &[(&str, &[u8])] = include!(concat!(env!("OUT_DIR"), "/query_sets.rs"));
+
 /// Queries in a packed set where nobody says how many.
 pub const DEFAULT_QUERIES: usize = 50;
 
@@ -254,15 +257,31 @@ impl PackedQuery {
 }
 
 impl QuerySet {
+    /// Whether there is something to load.
+    pub(super) fn exists(&self, folder: &Path) -> bool {
+        self.shipped(folder).is_some() || folder.join(&self.from).exists()
+    }
+
+    /// The bytes of a set that comes with the program, for a study without a folder.
+    fn shipped(&self, folder: &Path) -> Option<&'static [u8]> {
+        let is_ready = folder.as_os_str().is_empty();
+        let mut sets = READY.iter().filter(|_| is_ready);
+        let found = sets.find(|(name, _)| Path::new(name) == self.from);
+        found.map(|(_, bytes)| *bytes)
+    }
+
     /// The queries of a packed file, or all that the method chose in the run of a folder, in the
-    /// order in which they were asked. `folder` is where the study's file lies.
+    /// order in which they were asked. `folder` is where the study's file lies; a ready study has
+    /// none, and its sets come with the program.
     ///
     /// # Errors
     /// As [`PackedQueries::read`] and [`PackedQueries::of_run`]; queries of another task or method
     /// than the study says.
     pub fn load(&self, folder: &Path) -> Result<Vec<PackedQuery>, QuerySetError> {
         let path = folder.join(&self.from);
-        let packed = if path.is_dir() {
+        let packed = if let Some(bytes) = self.shipped(folder) {
+            PackedQueries::unpack(&path, bytes)?
+        } else if path.is_dir() {
             PackedQueries::of_run(&path, None, "")?
         } else {
             PackedQueries::read(&path)?

@@ -10,20 +10,27 @@ pub const READY: &[(&str, &str)] = &[
         "task-1-demo",
         include_str!("../../../../assets/studies/task-1-demo.toml"),
     ),
+    (
+        "task-2-demo",
+        include_str!("../../../../assets/studies/task-2-demo.toml"),
+    ),
 ];
 
 #[cfg(test)]
 mod tests {
     use std::path::Path;
 
+    use domain::episode::SegmentRecord;
+    use domain::query::Question;
+
     use super::*;
     use crate::study::plan::play;
-    use crate::study::{Expected, KnownPair, Shot, StudyFile};
+    use crate::study::{Expected, KnownPair, PairRole, Shot, StudyFile, plan};
 
     fn ready() -> impl Iterator<Item = (&'static str, StudyFile)> {
         READY.iter().map(|(name, text)| {
             let file = format!("{name}.toml");
-            let study = StudyFile::parse(&file, text, Path::new("../../assets/studies"));
+            let study = StudyFile::parse(&file, text, Path::new(""));
             (*name, study.unwrap_or_else(|mistakes| panic!("{mistakes}")))
         })
     }
@@ -35,13 +42,18 @@ mod tests {
             .collect();
         assert_eq!(
             sizes,
-            [("task-1", (80, 2, 10)), ("task-1-demo", (20, 1, 3))]
+            [
+                ("task-1", (80, 2, 10)),
+                ("task-1-demo", (20, 1, 3)),
+                ("task-2-demo", (24, 2, 2)),
+            ]
         );
     }
 
     #[test]
     fn the_answers_that_a_ready_study_calls_right_are_right_by_the_task_reward() {
-        for (name, study) in ready() {
+        let preferences = ready().filter(|(_, study)| study.question == Question::Preference);
+        for (name, study) in preferences {
             for pair in study.practice.iter().chain(&study.checks) {
                 let KnownPair { task, expects, .. } = pair;
                 let sum = |shot| reward_of(task, shot, study.segment_len);
@@ -53,6 +65,32 @@ mod tests {
                 let size = first.abs().max(second.abs());
                 assert!(better > 0.1 * size, "{name}, {task}: {first} and {second}");
             }
+        }
+    }
+
+    #[test]
+    fn practice_of_stages_is_right_by_the_true_stages() {
+        let stages = ready().filter(|(_, study)| study.question == Question::SameStage);
+        for (name, study) in stages {
+            for pair in plan(&study, Path::new("")).unwrap() {
+                let PairRole::Practice { expects, .. } = &pair.role else {
+                    continue;
+                };
+                let ends = |record: &SegmentRecord| (record.stages[0], *record.stages.last().unwrap());
+                let (first, second) = (ends(&pair.first), ends(&pair.second));
+                let is_same = first == second && first.0 == first.1;
+                assert_eq!(is_same, *expects == Expected::Same, "{name}: {first:?} {second:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn every_ready_study_can_be_planned_without_anything_else() {
+        for (name, study) in ready() {
+            let pairs = plan(&study, Path::new("")).unwrap_or_else(|e| panic!("{name}: {e}"));
+            let (counted, practice, _) = study.n_pairs();
+            let n_known = practice as usize + study.checks.len();
+            assert_eq!(pairs.len(), counted as usize + n_known, "{name}");
         }
     }
 

@@ -91,22 +91,23 @@ fn read_sets(
         let methods: Vec<&str> = METHODS.iter().map(|method| method.name).collect();
         known(&set, &method, "method", &methods);
         let from = set.words("from");
-        if !from.value.is_empty() && !folder.join(&from.value).exists() {
-            let message = format!("the query set {} does not exist", from.value);
+        let found = QuerySet {
+            task: task.value,
+            method: method.value,
+            from: from.value.into(),
+        };
+        if !found.from.as_os_str().is_empty() && !found.exists(folder) {
+            let message = format!("the query set {} does not exist", found.from.display());
             set.note(from.line, message);
         }
         let is_twice = sets
             .iter()
-            .any(|other| other.task == task.value && other.method == method.value);
+            .any(|other| other.task == found.task && other.method == found.method);
         if is_twice {
-            let message = format!("{} of {} is there already", method.value, task.value);
+            let message = format!("{} of {} is there already", found.method, found.task);
             set.note(set.line(), message);
         }
-        sets.push(QuerySet {
-            task: task.value,
-            method: method.value,
-            from: from.value.into(),
-        });
+        sets.push(found);
         set.finish();
     }
     check_cover(section, tasks, &sets);
