@@ -1,7 +1,7 @@
 //! How well an expert's steps are told apart by their states: calibration, guesses that are
 //! nearly right, and what bounds the multi-stage measure, by number of stages.
 
-use domain::stage::{StageMeasures, TimestepReport};
+use domain::stage::{N_BINS, StageMeasures, TimestepReport};
 
 use super::plot::{Entry, Labels, Panel, Pen, Scale, Sheet, Svg, series};
 use super::seeds::in_order_of_appearance;
@@ -78,9 +78,11 @@ fn draw_calibration(svg: &mut Svg, panel: &Panel, name: &str, report: &TimestepR
     };
     panel.draw_axes(svg, labels);
     let bins = &report.calibration.bins;
+    let width = 1.0 / N_BINS as f64;
     for bin in bins {
+        let middle = ((bin.confidence / width).ceil().max(1.0) - 0.5) * width;
         let share = bin.n as f64 / report.n_states as f64;
-        panel.bar(svg, (bin.confidence, share), 0.05, QUIET_LINE.color);
+        panel.bar(svg, (middle, share), width, QUIET_LINE.color);
     }
     panel.draw_diagonal(svg, QUIET_LINE);
     let points: Vec<_> = bins.iter().map(|b| (b.confidence, b.accuracy)).collect();
@@ -165,6 +167,17 @@ mod tests {
         let two = draw(row(1) + &row(2)).unwrap();
         assert!(two.contains("door-open, seed 2"), "{two}");
         assert_eq!(two.matches("Off by at most").count(), 2);
+    }
+
+    #[test]
+    fn bars_stand_on_their_bins() {
+        let svg = draw(row(1)).unwrap();
+        // Bins 14 and, as 0.6 is a little more in single precision, 10 of 15, each 16.67 wide, in
+        // a panel that begins at 58.
+        for left in ["274.67", "208"] {
+            let bar = format!("<rect x=\"{left}\"");
+            assert!(svg.contains(&bar), "{bar} is not in {svg}");
+        }
     }
 
     #[test]
