@@ -10,6 +10,8 @@ use lab::study::{READY, StudyFile};
 
 use super::{BadInput, say};
 
+mod pack;
+
 /// Studies with people, from one file each
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -27,6 +29,8 @@ enum Action {
         /// A file, or the name of a ready study: task-1, task-1-demo
         file: PathBuf,
     },
+    /// Pack the queries of a finished run into one small file, to be asked in studies
+    Pack(pack::Args),
 }
 
 /// Runs the command.
@@ -34,8 +38,10 @@ enum Action {
 /// # Errors
 /// [`BadInput`] names each mistake of a file with its line.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
-    let Action::Check { file } = &args.action;
-    say(&described(&read(file)?))?;
+    match &args.action {
+        Action::Check { file } => say(&described(&read(file)?))?,
+        Action::Pack(args) => pack::run(args)?,
+    }
     Ok(ExitCode::SUCCESS)
 }
 
