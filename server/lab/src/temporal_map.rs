@@ -90,9 +90,8 @@ impl TemporalMap {
     /// A run without a temporal distance, or without that episode.
     pub fn of(record: &RunRecord, episode: Option<u32>) -> Result<Self, MapError> {
         let config = record.config();
-        let temporal = record.temporal_distance()?.ok_or_else(|| {
-            MapError::NotLearned(config.method.clone(), learning_methods().join(", "))
-        })?;
+        let temporal = record.temporal_distance()?;
+        let temporal = temporal.ok_or_else(|| MapError::not_learned(&config.method))?;
         if temporal.n_updates() == 0 {
             return Err(MapError::NotYet {
                 first: config.feedback.step_of(0),
@@ -142,6 +141,18 @@ impl TemporalMap {
             steps,
             distance,
         })
+    }
+}
+
+/// Whether runs of a method learn a temporal distance, so that they have maps.
+pub fn is_learned_by(method: &str) -> bool {
+    learning_methods().contains(&method)
+}
+
+impl MapError {
+    /// What is told of a method without a temporal distance.
+    pub fn not_learned(method: &str) -> Self {
+        Self::NotLearned(method.to_owned(), learning_methods().join(", "))
     }
 }
 

@@ -116,7 +116,10 @@ fn draw(svg: &mut Svg, top: f64, map: &TemporalMap) {
         y += LANE;
     }
     draw_asked(svg, &panel, y, map);
-    let note = format!("Learned in {} steps of the run.", map.run_step);
+    let note = format!(
+        "Darker: nearer, as learned in {} steps of the run. Outlined: the best segmentation.",
+        map.run_step
+    );
     let below = top + height(map) - 14.0;
     svg.text((LEFT - 8.0, below), &note, Anchor::Start, NAME);
 }
@@ -134,7 +137,7 @@ fn draw_distances(svg: &mut Svg, panel: &Panel, map: &TemporalMap) -> f64 {
     let farthest = all.filter(|d| d.is_finite()).fold(0.0, f32::max);
     let level = |d: f32| {
         let near = if farthest > 0.0 && d.is_finite() {
-            1.0 - d / farthest
+            1.0 - (d / farthest).sqrt() // what is near has most of the shades
         } else {
             1.0
         };
@@ -160,7 +163,7 @@ fn draw_distances(svg: &mut Svg, panel: &Panel, map: &TemporalMap) -> f64 {
     f64::from(farthest)
 }
 
-/// What the shades mean, right of the map.
+/// What the shades mean, right of the map: they go with the root of the distance.
 fn draw_ramp(svg: &mut Svg, panel: &Panel, farthest: f64) {
     let Frame {
         x,
@@ -179,6 +182,11 @@ fn draw_ramp(svg: &mut Svg, panel: &Panel, farthest: f64) {
         svg.text((left + 20.0, y), text, Anchor::Start, NAME);
     };
     label(svg, y + 9.0, &format!("{farthest:.1} nats"));
+    label(
+        svg,
+        y + height * 0.25 + 4.0,
+        &format!("{:.1}", farthest / 4.0),
+    );
     label(svg, y + height * 0.5, "0");
 }
 
