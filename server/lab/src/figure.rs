@@ -19,6 +19,8 @@ mod same_stage_bars;
 mod seeds;
 mod stage_gaps;
 mod stage_map;
+mod strips;
+mod temporal_map;
 mod timestep_classifier;
 
 pub use curves::points as curve_points;
@@ -26,6 +28,7 @@ pub use preferences::{PreferenceRow, Preferred};
 pub use rows::{CurveRow, rows_of_run};
 pub(crate) use seeds::LEAST_FOR_INTERVAL;
 pub use stage_gaps::points as stage_gap_points;
+pub use strips::{Shot, StripRow};
 
 /// A file of results, read: JSON Lines.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -73,6 +76,8 @@ pub const FIGURES: &[FigureEntry] = &[
     same_stage_bars::ENTRY,
     stage_map::ENTRY,
     stage_gaps::ENTRY,
+    temporal_map::ENTRY,
+    strips::ENTRY,
     timestep_classifier::ENTRY,
 ];
 

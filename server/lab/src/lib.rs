@@ -16,6 +16,7 @@ pub mod policy;
 pub mod record;
 pub mod run;
 pub mod study;
+pub mod temporal_map;
 
 mod candidates;
 mod folder;

@@ -4,11 +4,14 @@ use std::path::Path;
 
 use domain::query::{Query, QueryKey};
 use learn::checkpoint::Archive;
+use learn::device::Device;
 use learn::replay::{Replay, ReplayMark};
+use learn::temporal::TemporalDistance;
 
 use crate::config::{RunConfig, find_task};
 use crate::folder::RunFolder;
 use crate::memory::shape;
+use crate::method;
 use crate::preferences::Preferences;
 use crate::run::{Progress, RunError};
 
@@ -18,6 +21,7 @@ pub struct RunRecord {
     step: u64,
     replay: Replay,
     asked: Vec<(QueryKey, Query)>,
+    archive: Archive,
 }
 
 impl RunRecord {
@@ -45,6 +49,7 @@ impl RunRecord {
             asked: preferences.keyed(),
             config,
             replay,
+            archive,
         })
     }
 
@@ -66,6 +71,20 @@ impl RunRecord {
     /// All its episodes.
     pub fn replay(&self) -> &Replay {
         &self.replay
+    }
+
+    /// The temporal distance as learned so far, `None` where the method learns none.
+    ///
+    /// # Errors
+    /// When the checkpoint does not hold what its settings say.
+    pub fn temporal_distance(&self) -> Result<Option<TemporalDistance>, RunError> {
+        if !method::build(&self.config)?.learns_temporal_distance() {
+            return Ok(None);
+        }
+        let (settings, n) = (&self.config.temporal, self.replay.shape().observation);
+        let mut temporal = TemporalDistance::new(settings, n, self.config.seed, Device::CPU);
+        temporal.load(&self.archive)?;
+        Ok(Some(temporal))
     }
 
     /// Every query that was asked, in the order of their keys.

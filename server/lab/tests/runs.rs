@@ -6,6 +6,7 @@
 
 mod methods;
 mod query_sets;
+mod temporal_map;
 
 use std::path::PathBuf;
 use std::sync::mpsc::channel;

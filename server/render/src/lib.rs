@@ -18,7 +18,7 @@ mod renderer;
 mod smooth;
 mod target;
 
-pub use contact_sheet::contact_sheet;
+pub use contact_sheet::{SHEET_FRAMES, contact_sheet, evenly};
 pub use error::RenderError;
 pub use image::RgbaImage;
 pub use renderer::Renderer;

@@ -7,12 +7,18 @@ use std::process::ExitCode;
 use anyhow::Context as _;
 use lab::config::RunConfig;
 use lab::figure::{self, FIGURES, Request, Source};
+use lab::record::RunRecord;
+use lab::temporal_map::TemporalMap;
 
 use super::BadInput;
 
 mod picture;
+mod strips;
 
 pub(super) use picture::{Format, encode};
+
+/// Queries of each method in the figure `strips`.
+const TOP: usize = 2;
 
 /// Draw results: rows of evaluations, answers or probabilities, one JSON object a line
 #[derive(Debug, clap::Args)]
@@ -20,7 +26,7 @@ pub(super) use picture::{Format, encode};
 pub struct Args {
     /// Which figure
     name: String,
-    /// Files of rows; for curves also the folders of runs
+    /// Files of rows; for some figures also folders of runs or packed query sets
     #[arg(value_name = "ROWS")]
     rows: Vec<PathBuf>,
     /// What runs along the horizontal axis
@@ -32,6 +38,12 @@ pub struct Args {
     /// How several seeds become one line: mean, or iqm, the mean of the middle half
     #[arg(long, value_name = "HOW")]
     center: Option<String>,
+    /// Queries of each method, for strips [default: 2]
+    #[arg(long, value_name = "N")]
+    top: Option<usize>,
+    /// The episode to show, for temporal-map [default: the one that was asked about most]
+    #[arg(long, value_name = "NUMBER")]
+    episode: Option<u32>,
     /// Where to write it; .svg or .png
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
@@ -50,7 +62,9 @@ fn after_help() -> String {
     text.push_str(
         "\nExamples:
   stair figure curves results/*.jsonl --y success_rate --x step --out curves.svg
-  stair figure curves data/train/go-fetch-return-stair-1 --out curves.png",
+  stair figure curves data/train/go-fetch-return-stair-1 --out curves.png
+  stair figure strips stair.queries pebble.queries --out strips.png
+  stair figure temporal-map data/train/go-fetch-return-stair-1 --out map.svg",
     );
     text
 }
@@ -67,11 +81,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         let told = format!("--scale is {}, but must be from 0.1 to 10", args.scale);
         return Err(BadInput(told).into());
     }
-    let sources = args
-        .rows
-        .iter()
-        .map(|path| read(path))
-        .collect::<Result<Vec<_>, _>>()?;
+    let sources = sources(figure.name, args)?;
     let request = Request {
         sources: &sources,
         x: args.x.as_deref(),
@@ -81,6 +91,37 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let svg = figure::make(figure, &request).map_err(BadInput::from_error)?;
     write(&args.out, &encode(svg, format, args.scale)?)?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// What a figure draws, from the files and folders that were named.
+fn sources(figure: &str, args: &Args) -> anyhow::Result<Vec<Source>> {
+    let refused = |option: &str| {
+        let told = format!("{figure} leaves no choice of --{option}");
+        Err(BadInput(told).into())
+    };
+    match (figure, args.top, args.episode) {
+        (_, Some(_), _) if figure != "strips" => refused("top"),
+        (_, _, Some(_)) if figure != "temporal-map" => refused("episode"),
+        ("strips", top, _) => strips::sources(&args.rows, top.unwrap_or(TOP)),
+        ("temporal-map", _, episode) => {
+            let map = |path: &PathBuf| temporal_map(path, episode);
+            args.rows.iter().map(map).collect()
+        }
+        _ => args.rows.iter().map(|path| read(path)).collect(),
+    }
+}
+
+/// The map of a run's folder as a row, or a file of such rows as it is.
+fn temporal_map(path: &Path, episode: Option<u32>) -> anyhow::Result<Source> {
+    if !path.is_dir() {
+        return read(path);
+    }
+    let record = RunRecord::open(path).map_err(BadInput::from_error)?;
+    let map = TemporalMap::of(&record, episode).map_err(BadInput::from_error)?;
+    Ok(Source {
+        name: path.display().to_string(),
+        text: serde_json::to_string(&map)?,
+    })
 }
 
 /// Writes a file, and makes its folder where there is none.
@@ -132,6 +173,8 @@ mod tests {
             x: None,
             y: None,
             center: None,
+            top: None,
+            episode: None,
             out,
             scale: 1.0,
         }
@@ -165,6 +208,45 @@ mod tests {
             let out = folder.path().join("third").with_extension(ending);
             run(&args(run_folder.join("metrics.jsonl"), out.clone())).unwrap();
             assert_eq!(std::fs::read(out).unwrap(), first, "by its metrics");
+        }
+    }
+
+    #[test]
+    fn an_option_of_another_figure_is_bad_input() {
+        let mut args = args("rows.jsonl".into(), "figure.svg".into());
+        args.top = Some(3);
+        let told = run(&args).unwrap_err();
+        assert!(told.is::<BadInput>() && told.to_string().contains("no choice of --top"));
+        (args.top, args.episode) = (None, Some(3));
+        let told = run(&args).unwrap_err().to_string();
+        assert!(told.contains("no choice of --episode"), "{told}");
+    }
+
+    #[test]
+    fn strips_and_maps_of_what_holds_none_are_bad_input() {
+        let folder = tempfile::tempdir().unwrap();
+        let foreign = folder.path().join("mine.queries");
+        write(&foreign, b"no queries").unwrap();
+        for (name, rows, said) in [
+            ("strips", foreign, "is no packed query set"),
+            (
+                "strips",
+                folder.path().to_owned(),
+                "cannot read the run's settings",
+            ),
+            (
+                "temporal-map",
+                folder.path().to_owned(),
+                "cannot read the run's settings",
+            ),
+        ] {
+            let mut args = args(rows, folder.path().join("figure.svg"));
+            args.name = name.into();
+            let told = run(&args).unwrap_err();
+            assert!(
+                told.is::<BadInput>() && told.to_string().contains(said),
+                "{told}"
+            );
         }
     }
 

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use anyhow::Context;
 use domain::scene::{Camera, Frame, Scene};
 use lab::config::find_task;
-use render::{CLIP_SIZE, Renderer, RgbaImage, clip, contact_sheet};
+use render::{CLIP_SIZE, Renderer, RgbaImage, SHEET_FRAMES, clip, contact_sheet, evenly};
 
 use super::BadInput;
 use crate::policy::Policy;
@@ -138,13 +138,12 @@ fn episode(
 
 /// As many frames as a sheet shows, from the first to the last: no others need be drawn.
 fn spread(frames: &[Frame]) -> Vec<Frame> {
-    let n_shown = frames.len().min(12);
-    (0..n_shown)
-        .map(|k| frames[k * (frames.len() - 1) / (n_shown - 1).max(1)].clone())
+    evenly(frames.len(), SHEET_FRAMES)
+        .map(|k| frames[k].clone())
         .collect()
 }
 
-fn png(image: &RgbaImage) -> anyhow::Result<Vec<u8>> {
+pub(super) fn png(image: &RgbaImage) -> anyhow::Result<Vec<u8>> {
     let mut bytes = std::io::Cursor::new(Vec::new());
     image.write_to(&mut bytes, image::ImageFormat::Png)?;
     Ok(bytes.into_inner())

@@ -2,7 +2,7 @@
 
 use domain::stage::{StageProbabilities, best_segmentation};
 
-use super::plot::{Labels, Panel, Pen, Scale, Sheet, Svg};
+use super::plot::{Labels, Panel, Pen, Scale, Sheet, Svg, shade};
 use super::{FigureEntry, FigureError, Request, read_rows};
 
 pub(super) const ENTRY: FigureEntry = FigureEntry {
@@ -80,39 +80,22 @@ fn draw_map(svg: &mut Svg, panel: &Panel, name: &str, table: &StageProbabilities
 
 /// Neighbours of one shade are one rectangle.
 fn draw_stage(svg: &mut Svg, panel: &Panel, table: &StageProbabilities, stage: usize) {
-    let shade = |step: usize| (table.row(step)[stage] * f32::from(N_SHADES)).round() as u8;
+    let level = |step: usize| (table.row(step)[stage] * f32::from(N_SHADES)).round() as u8;
     let (bottom, top) = (stage as f64 + 0.5, stage as f64 + 1.5);
     let mut start = 0;
     while start < table.n_states() {
-        let here = shade(start);
+        let here = level(start);
         let end = (start..table.n_states())
-            .find(|&step| shade(step) != here)
+            .find(|&step| level(step) != here)
             .unwrap_or_else(|| table.n_states());
         if here > 0 {
             let (left, upper) = panel.at((start as f64, top));
             let (right, lower) = panel.at((end as f64, bottom));
             let share = f64::from(here) / f64::from(N_SHADES);
-            svg.cell([left, upper, right - left, lower - upper], &color(share));
+            svg.cell([left, upper, right - left, lower - upper], &shade(share));
         }
         start = end;
     }
-}
-
-/// From paper through blue to almost black: the luminance falls all the way.
-fn color(share: f64) -> String {
-    const STOPS: [[f64; 3]; 3] = [
-        [255.0, 255.0, 255.0],
-        [86.0, 160.0, 214.0],
-        [8.0, 40.0, 84.0],
-    ];
-    let place = 2.0 * share.clamp(0.0, 1.0);
-    let from = (place as usize).min(1);
-    let part = place - from as f64;
-    let mixed = [0, 1, 2].map(|k| {
-        let (a, b) = (STOPS[from][k], STOPS[from + 1][k]);
-        (a + part * (b - a)).round() as u8
-    });
-    format!("#{:02x}{:02x}{:02x}", mixed[0], mixed[1], mixed[2])
 }
 
 #[cfg(test)]
@@ -147,16 +130,5 @@ mod tests {
         );
         let told = draw("[0.9,1.5]\n").unwrap_err().to_string();
         assert!(told.contains("stage 1 at step 0 is 1.5"), "{told}");
-    }
-
-    #[test]
-    fn shades_darken_all_the_way() {
-        let luminance = |share: f64| {
-            let text = color(share);
-            let part = |k| f64::from(u8::from_str_radix(&text[k..k + 2], 16).unwrap());
-            0.2126 * part(1) + 0.7152 * part(3) + 0.0722 * part(5)
-        };
-        let ramp: Vec<f64> = (0..=32).map(|k| luminance(f64::from(k) / 32.0)).collect();
-        assert!(ramp.is_sorted_by(|a, b| a > b), "{ramp:?}");
     }
 }

@@ -110,6 +110,23 @@ pub(crate) fn series(n: usize) -> Series {
     }
 }
 
+/// From paper through blue to almost black: the luminance falls all the way.
+pub(crate) fn shade(share: f64) -> String {
+    const STOPS: [[f64; 3]; 3] = [
+        [255.0, 255.0, 255.0],
+        [86.0, 160.0, 214.0],
+        [8.0, 40.0, 84.0],
+    ];
+    let place = 2.0 * share.clamp(0.0, 1.0);
+    let from = (place as usize).min(1);
+    let part = place - from as f64;
+    let mixed = [0, 1, 2].map(|k| {
+        let (a, b) = (STOPS[from][k], STOPS[from + 1][k]);
+        (a + part * (b - a)).round() as u8
+    });
+    format!("#{:02x}{:02x}{:02x}", mixed[0], mixed[1], mixed[2])
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -122,5 +139,16 @@ mod tests {
                 assert!(a.dash != b.dash || a.marker != b.marker, "{m} and {n}");
             }
         }
+    }
+
+    #[test]
+    fn shades_darken_all_the_way() {
+        let luminance = |share: f64| {
+            let text = shade(share);
+            let part = |k| f64::from(u8::from_str_radix(&text[k..k + 2], 16).unwrap());
+            0.2126 * part(1) + 0.7152 * part(3) + 0.0722 * part(5)
+        };
+        let ramp: Vec<f64> = (0..=32).map(|k| luminance(f64::from(k) / 32.0)).collect();
+        assert!(ramp.is_sorted_by(|a, b| a > b), "{ramp:?}");
     }
 }

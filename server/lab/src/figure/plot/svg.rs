@@ -133,6 +133,29 @@ impl Svg {
         ));
     }
 
+    /// Rectangles of one colour, as one element; they join without a seam.
+    pub(crate) fn cells(&mut self, cells: &[[f64; 4]], color: &str) {
+        let mut path = String::new();
+        for [x, y, w, h] in cells {
+            let (x, y, w, h) = (number(*x), number(*y), number(*w), number(*h));
+            write!(path, "M{x} {y}h{w}v{h}h-{w}z").expect("writing to a string cannot fail");
+        }
+        self.put(&format!(
+            "<path d=\"{path}\" fill=\"{color}\" shape-rendering=\"crispEdges\"/>"
+        ));
+    }
+
+    /// A picture: a PNG file in base64, and nothing else.
+    pub(crate) fn image(&mut self, [x, y, w, h]: [f64; 4], png: &str) {
+        self.put(&format!(
+            "<image x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" href=\"data:image/png;base64,{png}\"/>",
+            number(x),
+            number(y),
+            number(w),
+            number(h)
+        ));
+    }
+
     /// A filled disc with an outline.
     pub(crate) fn disc(&mut self, (x, y): (f64, f64), radius: f64, color: &str, pen: Pen) {
         self.put(&format!(
