@@ -20,8 +20,16 @@ fn embed_query_sets() {
     let mut paths = entries(&assets("studies/sets"));
     paths.sort();
     let entry = |path: PathBuf| {
-        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        format!("({:?}, include_bytes!({:?}))", format!("sets/{name}"), path.display().to_string())
+        let name = path
+            .file_name()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned();
+        format!(
+            "({:?}, include_bytes!({:?}))",
+            format!("sets/{name}"),
+            path.display().to_string()
+        )
     };
     write_table("query_sets.rs", paths.into_iter().map(entry));
 }

@@ -12,7 +12,8 @@ use sim::expert::{Rollout, rollout};
 use sim::tasks::Task;
 
 use super::{
-    Expected, KnownPair, PackedSegment, Player, QuerySet, QuerySetError, Shot, Source, StudyFile, spread,
+    Expected, KnownPair, PackedSegment, Player, QuerySet, QuerySetError, Shot, Source, StudyFile,
+    spread,
 };
 
 /// Keys of [`Stream::Study`] from here on draw segments; smaller ones lay out labelers' turns.
@@ -84,7 +85,9 @@ pub enum PlanError {
         expected: u32,
     },
     /// A query set with fewer queries than the study asks for.
-    #[error("{path} holds {found} queries, but the study asks each labeler about {expected} of them")]
+    #[error(
+        "{path} holds {found} queries, but the study asks each labeler about {expected} of them"
+    )]
     TooFew {
         /// The file or folder.
         path: String,

@@ -76,10 +76,15 @@ mod tests {
                 let PairRole::Practice { expects, .. } = &pair.role else {
                     continue;
                 };
-                let ends = |record: &SegmentRecord| (record.stages[0], *record.stages.last().unwrap());
+                let ends =
+                    |record: &SegmentRecord| (record.stages[0], *record.stages.last().unwrap());
                 let (first, second) = (ends(&pair.first), ends(&pair.second));
                 let is_same = first == second && first.0 == first.1;
-                assert_eq!(is_same, *expects == Expected::Same, "{name}: {first:?} {second:?}");
+                assert_eq!(
+                    is_same,
+                    *expects == Expected::Same,
+                    "{name}: {first:?} {second:?}"
+                );
             }
         }
     }
