@@ -1,5 +1,6 @@
 //! The API of a server, as a program outside uses it: documented routes only.
 
+use std::io::Write;
 use std::time::{Duration, Instant};
 
 use serde::Serialize;
@@ -95,19 +96,17 @@ impl Client {
         })?)
     }
 
-    /// The body of `GET path`, byte for byte.
+    /// Copies the body of `GET path`, byte for byte, as it arrives.
     ///
     /// # Errors
-    /// As [`Client::send`].
-    pub(super) fn download(&mut self, path: &str) -> anyhow::Result<Vec<u8>> {
+    /// As [`Client::send`]; a connection that breaks, or an output that cannot be written.
+    pub(super) fn download(&mut self, path: &str, to: &mut impl Write) -> anyhow::Result<()> {
         let mut response = self.send(path, |client, url| {
             client.request(client.agent.get(url)).call()
         })?;
-        Ok(response
-            .body_mut()
-            .with_config()
-            .limit(u64::MAX)
-            .read_to_vec()?)
+        let body = response.body_mut().with_config().limit(u64::MAX);
+        std::io::copy(&mut body.reader(), to)?;
+        Ok(())
     }
 
     /// The JSON body that answers `POST path`.

@@ -1,6 +1,7 @@
 //! `stair export`: a run's answers as a table.
 
-use std::io::Write as _;
+use std::fs::File;
+use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Duration;
@@ -10,7 +11,7 @@ use store::{LabelsOf, RunId, Store, StudyId};
 
 use super::BadInput;
 use super::client::{Client, path_segment};
-use crate::label_table::{self, TableFormat};
+use crate::label_table::{self, TableError, TableFormat};
 
 /// Write the answers of a run or a study as a table, one row each, from a server or from its data folder
 #[derive(Debug, clap::Args)]
@@ -45,18 +46,29 @@ pub struct Args {
 /// [`BadInput`] for an unknown run, a folder without data or held by a server; a file that
 /// cannot be written.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
-    let bytes = match &args.server {
-        Some(server) => from_server(server, args)?,
-        None => from_folder(args)?,
-    };
     match &args.out {
-        Some(path) => std::fs::write(path, bytes)
-            .with_context(|| format!("cannot write {}", path.display()))?,
-        None => std::io::stdout()
-            .write_all(&bytes)
-            .context("cannot write to the terminal")?,
+        Some(path) => {
+            let told = || format!("cannot write {}", path.display());
+            // Beside it first: a table that ends early must not look whole.
+            let part = path.with_added_extension("part");
+            let mut file = BufWriter::new(File::create(&part).with_context(told)?);
+            let written = export(args, &mut file).and_then(|()| file.flush().with_context(told));
+            if written.is_err() {
+                let _ = std::fs::remove_file(&part); // it may be gone; the first error is told
+            }
+            written?;
+            std::fs::rename(&part, path).with_context(told)?;
+        }
+        None => export(args, &mut std::io::stdout().lock())?,
     }
     Ok(ExitCode::SUCCESS)
+}
+
+fn export(args: &Args, to: &mut impl Write) -> anyhow::Result<()> {
+    match &args.server {
+        Some(server) => from_server(server, args, to),
+        None => from_folder(args, to),
+    }
 }
 
 /// What is exported: `runs` or `studies`, with the number that was typed.
@@ -67,17 +79,18 @@ fn asked(args: &Args) -> (&'static str, &str) {
     }
 }
 
-fn from_server(server: &str, args: &Args) -> anyhow::Result<Vec<u8>> {
+fn from_server(server: &str, args: &Args, to: &mut impl Write) -> anyhow::Result<()> {
     let (kind, id) = asked(args);
     let mut client = Client::new(server, Duration::from_secs(30))?;
-    client.download(&format!(
+    let path = format!(
         "/api/v1/{kind}/{}/labels?format={}",
         path_segment(id)?,
         args.format.word()
-    ))
+    );
+    client.download(&path, to)
 }
 
-fn from_folder(args: &Args) -> anyhow::Result<Vec<u8>> {
+fn from_folder(args: &Args, to: &mut impl Write) -> anyhow::Result<()> {
     let (kind, id) = asked(args);
     let what = if kind == "runs" { "run" } else { "study" };
     let unknown = || {
@@ -98,13 +111,12 @@ fn from_folder(args: &Args) -> anyhow::Result<Vec<u8>> {
             store.study(id).await.map_err(|_| unknown())?;
             LabelsOf::Study(id)
         };
-        let mut table = Vec::new();
         let take = |bytes: Vec<u8>| {
-            table.extend(bytes);
-            std::future::ready(Ok(()))
+            let written = to.write_all(&bytes);
+            std::future::ready(written.map_err(|error| TableError::Unreadable(error.to_string())))
         };
         label_table::write(&store, of, args.format, take).await?;
-        anyhow::Ok(table)
+        anyhow::Ok(())
     })
 }
 
