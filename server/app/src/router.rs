@@ -31,6 +31,7 @@ pub fn router(state: AppState) -> Router {
         .route("/runs/{id}/pause", post(pages::run::pause))
         .route("/runs/{id}/resume", post(pages::run::resume))
         .route("/runs/{id}/stop", post(pages::run::stop))
+        .route("/runs/{id}/temporal-map.svg", get(pages::run::map::picture))
         .merge(experiments())
         .merge(api())
         .route("/enter", get(labelers::enter))
