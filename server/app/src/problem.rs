@@ -141,6 +141,16 @@ impl Problem {
         )
     }
 
+    /// 404: the run has no temporal map, or none that can be drawn now.
+    pub fn no_map(detail: impl Into<String>) -> Self {
+        Self::new(
+            StatusCode::NOT_FOUND,
+            "/problems/no-temporal-map",
+            "This run has no temporal map",
+            detail,
+        )
+    }
+
     /// 401: nobody has said who answers.
     pub fn who_are_you() -> Self {
         let detail =

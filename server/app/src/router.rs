@@ -33,6 +33,7 @@ pub fn router(state: AppState) -> Router {
         .route("/runs/{id}/pause", post(pages::run::pause))
         .route("/runs/{id}/resume", post(pages::run::resume))
         .route("/runs/{id}/stop", post(pages::run::stop))
+        .route("/runs/{id}/temporal-map.svg", get(pages::run::map::picture))
         .merge(experiments())
         .merge(study_pages())
         .merge(api())

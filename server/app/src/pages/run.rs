@@ -14,6 +14,8 @@ use crate::live::HUMAN;
 use crate::problem::Problem;
 use crate::state::AppState;
 
+pub mod map;
+
 /// Answered pairs on the page.
 const N_PAIRS: u32 = 6;
 
@@ -65,6 +67,9 @@ struct RunPage {
     /// Changes when the two do.
     demonstrations_version: String,
     curves: &'static [Curve],
+    /// Whether there is a temporal map, and else why not.
+    has_map: bool,
+    no_map: String,
     pairs: Vec<Pair>,
     has_pairs: bool,
     /// Changes when the newest pairs do.
@@ -166,6 +171,7 @@ pub async fn page(State(app): State<AppState>, Run(row): Run) -> Result<Response
     let (n_same, n_judged) = app.store.same_stage_rate(id).await?;
     let success = last_success(&app, id).await?;
     let broken = broken(&app, id).await?;
+    let no_map = map::missing(&run.method, run.labels);
     Ok(show(&RunPage {
         run: id.to_string(),
         task_title: title(&run.task),
@@ -209,6 +215,8 @@ pub async fn page(State(app): State<AppState>, Run(row): Run) -> Result<Response
             .last()
             .map_or_else(Shown::default, |row| shown("Now", row)),
         curves: CURVES,
+        has_map: no_map.is_none(),
+        no_map: no_map.unwrap_or_default(),
         has_pairs: !pairs.is_empty(),
         pairs_version: pairs_version(&pairs),
         pairs: pairs.iter().map(pair).collect(),
