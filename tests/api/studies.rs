@@ -56,15 +56,20 @@ pub(crate) struct Open {
 
 impl Open {
     pub(crate) fn start(question: &str) -> Self {
+        Self::of(&json!({"text": small(question)}))
+    }
+
+    /// A study that comes with the program.
+    pub(crate) fn ready(name: &str) -> Self {
+        Self::of(&json!({"name": name}))
+    }
+
+    fn of(request: &Value) -> Self {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let server = ServerProcess::start(folder.path());
         let researcher = Client::stranger_of(&server);
         let made = researcher
-            .send(
-                "POST",
-                "/api/v1/studies",
-                Some(&json!({"text": small(question)})),
-            )
+            .send("POST", "/api/v1/studies", Some(request))
             .expect(201)
             .json();
         let path = format!("/api/v1/studies/{}", made["id"]);

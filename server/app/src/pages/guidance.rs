@@ -25,18 +25,22 @@ pub fn guidance(task: &str) -> Guidance {
 
 /// A study's own words, then the guidance for a task.
 pub fn guidance_with(words: &str, task: &str) -> Guidance {
-    let text = TEXTS
+    let of_task = TEXTS
         .iter()
         .find(|(name, _)| *name == task)
         .map_or(ANY, |(_, text)| text);
-    let text = if words.trim().is_empty() {
-        text.to_owned()
+    if words.trim().is_empty() {
+        text(of_task)
     } else {
-        format!("{}\n\n{text}", words.trim())
-    };
+        text(&format!("{}\n\n{of_task}", words.trim()))
+    }
+}
+
+/// Guidance that is somebody's own words alone.
+pub fn text(words: &str) -> Guidance {
     Guidance {
-        html: to_html(&text),
-        sha256: format!("{:x}", Sha256::digest(&text)),
+        html: to_html(words),
+        sha256: format!("{:x}", Sha256::digest(words)),
     }
 }
 

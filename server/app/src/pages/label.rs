@@ -8,7 +8,7 @@ use domain::query::Question;
 use serde::Deserialize;
 use store::{RunRow, StudyRow};
 
-use super::guidance::{Guidance, guidance, guidance_with};
+use super::guidance::{Guidance, guidance, guidance_with, text};
 use super::{show, thousands, title};
 use crate::api::labelers;
 use crate::extract::{Run, labeler};
@@ -102,7 +102,13 @@ pub async fn sign_in(
 /// The page with the study's own words above the task's.
 fn of_study(run: &RunRow, study: &StudyRow) -> Result<LabelPage, Problem> {
     let file = parse_study(study).map_err(|error| Problem::unusable_study(error.to_string()))?;
-    let page = with_guidance(run, &guidance_with(&file.guidance, &run.task));
+    let is_about_stages = study.question == Question::SameStage;
+    let words = if is_about_stages && !file.guidance.trim().is_empty() {
+        text(&file.guidance) // how to tell which does better is another question
+    } else {
+        guidance_with(&file.guidance, &run.task)
+    };
+    let page = with_guidance(run, &words);
     Ok(LabelPage {
         question: match study.question {
             Question::Preference => "preference",
