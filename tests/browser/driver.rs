@@ -41,8 +41,12 @@ impl Browser {
             .stdout(Stdio::piped())
             .spawn()
             .expect("chromedriver starts");
-        let mut driver = Driver(driver);
-        let port = port_of(&mut driver.0);
+        let mut driver = Driver {
+            process: driver,
+            port: 0,
+        };
+        driver.port = port_of(&mut driver.process);
+        let port = driver.port;
         let profile = tempfile::tempdir().expect("a temporary folder");
         let capabilities = capabilities(&chromium, profile.path(), scheme, size);
         let client = ClientBuilder::new(HttpConnector::new())
@@ -134,15 +138,22 @@ impl Browser {
 }
 
 /// ChromeDriver's process; its Chromium ends with it.
-struct Driver(Child);
+struct Driver {
+    process: Child,
+    port: u16,
+}
 
 impl Drop for Driver {
     fn drop(&mut self) {
-        // ChromeDriver ends its Chromium when it is asked to; when killed, it may leave it behind.
-        let asked = Command::new("kill").arg(self.0.id().to_string()).status();
-        if asked.is_ok_and(|status| status.success()) {
-            let _ = self.0.wait(); // it may be gone already
+        // Asked to shut down it ends its Chromium; killed, by whatever signal, it leaves it behind.
+        let config = ureq::Agent::config_builder().proxy(None);
+        let config = config.timeout_global(Some(Duration::from_secs(10)));
+        let agent: ureq::Agent = config.build().into();
+        let shut_down = format!("http://127.0.0.1:{}/shutdown", self.port);
+        if agent.get(&shut_down).call().is_err() {
+            let _ = self.process.kill(); // it may be gone already
         }
+        let _ = self.process.wait();
     }
 }
 

@@ -89,5 +89,5 @@ async fn a_person_answers_a_study_of_preferences_by_keys_only() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_person_answers_a_study_of_stages_by_keys_only() {
-    answers_everything("task-2-demo", "s", (2, 28), "same-stage-bars").await;
+    answers_everything("task-2-demo", "s", (2, 44), "same-stage-bars").await;
 }

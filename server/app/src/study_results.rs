@@ -254,7 +254,12 @@ fn same_stage(counted: &[&Label], results: &mut Results) {
             second: b,
         });
     }
-    let from = || format!("{} answers, {} tasks", counted.len(), tasks.len());
+    let of_tasks = if tasks.len() == 1 {
+        "1 task".to_owned()
+    } else {
+        format!("{} tasks", tasks.len())
+    };
+    let from = || format!("{} answers, {of_tasks}", counted.len());
     if let Some(test) = cochran_mantel_haenszel(&strata, Continuity::Corrected, LEVEL) {
         if let Some(estimate) = test.odds_ratio {
             let name = format!("odds of same stage, {first} over {second}");
