@@ -36,6 +36,11 @@ impl Reply {
         u64::from_be_bytes(*first)
     }
 
+    /// Bytes of the body.
+    pub(crate) fn len(&self) -> usize {
+        self.bytes.len()
+    }
+
     /// The body as JSON; null where it is none.
     pub(crate) fn json(&self) -> Value {
         serde_json::from_str(&self.text).unwrap_or_default()
