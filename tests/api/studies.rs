@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use crate::stories::server_process::{PATIENCE, ServerProcess};
+use crate::stories::server_process::{ServerProcess, wait_for};
 use crate::support::Client;
 
 /// A small study of the small task: six pairs, one practice, one check, one repeat.
@@ -67,22 +67,24 @@ impl Open {
     fn of(request: &Value) -> Self {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let server = ServerProcess::start(folder.path());
+        let made = Client::stranger_of(&server).send("POST", "/api/v1/studies", Some(request));
+        let path = format!("/api/v1/studies/{}", made.expect(201).json()["id"]);
+        Self::opened(server, path, folder)
+    }
+
+    /// The first study of a data folder.
+    pub(crate) fn over(folder: tempfile::TempDir) -> Self {
+        let server = ServerProcess::start(folder.path());
+        Self::opened(server, "/api/v1/studies/1".to_owned(), folder)
+    }
+
+    fn opened(server: ServerProcess, path: String, folder: tempfile::TempDir) -> Self {
         let researcher = Client::stranger_of(&server);
-        let made = researcher
-            .send("POST", "/api/v1/studies", Some(request))
-            .expect(201)
-            .json();
-        let path = format!("/api/v1/studies/{}", made["id"]);
-        let started = std::time::Instant::now();
-        loop {
+        wait_for("the study to be ready", || {
             let study = researcher.send("GET", &path, None).expect(200).json();
-            match study["state"].as_str() {
-                Some("ready") => break,
-                Some("preparing") => assert!(started.elapsed() < PATIENCE, "{study}"),
-                _ => panic!("{study}"),
-            }
-            std::thread::sleep(std::time::Duration::from_millis(50));
-        }
+            assert_ne!(study["state"], "failed", "{study}");
+            study["state"] == "ready"
+        });
         researcher
             .send("POST", &format!("{path}/open"), Some(&json!({})))
             .expect(200);
@@ -201,7 +203,7 @@ fn a_link_that_does_not_work_says_why() {
     let full = study
         .researcher
         .send("POST", &full, Some(&json!({"count": 2})));
-    assert!(full.expect(409).text.contains("answered by 2 labelers"));
+    assert!(full.expect(409).text.contains("1 more can be invited"));
     let second = study.code();
     study.close();
     assert!(join(&second, true).expect(410).text.contains("closed"));
@@ -229,7 +231,8 @@ fn each_mistake_of_a_file_comes_back_with_its_line() {
         .send("GET", "/api/v1/studies/7", None)
         .expect(404);
     researcher.send("GET", "/studies/none", None).expect(404);
-    researcher.send("GET", "/seat", None).expect(404);
+    let way_back = researcher.send("GET", "/seat", None).expect(404).text;
+    assert!(way_back.contains("Return code"), "{way_back}");
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use std::io::{BufRead as _, BufReader};
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use fantoccini::wd::Capabilities;
 use fantoccini::{Client, ClientBuilder, Locator};
@@ -119,21 +119,23 @@ impl Browser {
             .expect("it has text")
     }
 
-    /// Waits until an expression is true; fails with the page's words when it never becomes so.
+    /// Waits until an expression is true, on this page or on one that it leads to; fails with the
+    /// page's words when it never becomes so.
     pub(crate) async fn until(&self, expression: &str) {
-        let script = format!(
-            "const end = performance.now() + 110000;
-             while (performance.now() < end) {{
-               if ({expression}) return true;
-               await new Promise((resolve) => setTimeout(resolve, 20));
-             }}
-             return document.body.innerText.slice(0, 600);"
-        );
-        let outcome = self.run(&script, vec![]).await;
-        assert!(
-            outcome == json!(true),
-            "never came true: {expression}; the page says: {outcome}"
-        );
+        // Asked again and again from here: a script that waits in the page ends with the page.
+        let script = format!("return Boolean({expression});");
+        let end = Instant::now() + Duration::from_secs(110);
+        let mut outcome = Ok(Value::Null);
+        while Instant::now() < end {
+            outcome = self.client.execute(&script, vec![]).await;
+            if matches!(outcome, Ok(Value::Bool(true))) {
+                return;
+            }
+            tokio::time::sleep(Duration::from_millis(20)).await;
+        }
+        let page = "return document.body.innerText.slice(0, 600);";
+        let page = self.client.execute(page, vec![]).await;
+        panic!("never came true: {expression}, at last {outcome:?}; the page says: {page:?}");
     }
 }
 

@@ -1,5 +1,7 @@
 //! Answering: by keys only, changing one's mind, and through a lost connection.
 
+use std::time::Duration;
+
 use serde_json::json;
 
 use super::driver::{Browser, Scheme};
@@ -224,13 +226,19 @@ async fn a_double_click_and_a_second_tab_make_no_second_label() {
 
 /// Until nothing that was answered in this browser is unsent.
 async fn wait_until_stored(browser: &Browser) {
-    let none_unsent = "await new Promise((resolve, reject) => {
+    let n_unsent = "return new Promise((resolve, reject) => {
         const opening = indexedDB.open('stair', 1);
         opening.onerror = () => reject(opening.error);
         opening.onsuccess = () => {
             const counting = opening.result.transaction('unsent').objectStore('unsent').count();
-            counting.onsuccess = () => { opening.result.close(); resolve(counting.result === 0); };
+            counting.onsuccess = () => { opening.result.close(); resolve(counting.result); };
         };
     })";
-    browser.until(none_unsent).await;
+    for _ in 0..1_000 {
+        if browser.run(n_unsent, vec![]).await == json!(0) {
+            return;
+        }
+        tokio::time::sleep(Duration::from_millis(50)).await;
+    }
+    panic!("answers stay unsent");
 }

@@ -59,7 +59,7 @@ impl BadInput {
     /// An error whose cause is the input, with all that it says.
     pub fn from_error(error: impl Into<anyhow::Error>) -> anyhow::Error {
         let error: anyhow::Error = error.into();
-        Self(format!("{error:#}")).into()
+        Self(told(&error)).into()
     }
 }
 
@@ -70,6 +70,17 @@ impl std::fmt::Display for BadInput {
 }
 
 impl std::error::Error for BadInput {}
+
+/// What an error says, and its causes, each once: many repeat their cause in their own words.
+fn told(error: &anyhow::Error) -> String {
+    let mut told = error.to_string();
+    for cause in error.chain().skip(1).map(ToString::to_string) {
+        if !told.ends_with(&cause) {
+            told = told + ": " + &cause;
+        }
+    }
+    told
+}
 
 /// Writes a text to standard output. A reader that has seen enough, as `head` has, is no error.
 ///
@@ -89,8 +100,8 @@ fn say(text: &str) -> anyhow::Result<()> {
     }
 }
 
-/// Parses, runs, and turns errors into a line on stderr and an exit code: 2 for bad input, 1
-/// for everything else.
+/// Parses, runs, and turns errors into a line on stderr and an exit code: 2 for bad input, and for
+/// what a server refuses because it does not fit; 1 for everything else.
 pub fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Serve(args) => serve::run(args),
@@ -108,7 +119,24 @@ pub fn main() -> ExitCode {
         Command::Openapi(args) => openapi::run(&args),
     };
     result.unwrap_or_else(|error| {
-        eprintln!("stair: {error:#}");
-        ExitCode::from(if error.is::<BadInput>() { 2 } else { 1 })
+        eprintln!("stair: {}", told(&error));
+        let refused = error.downcast_ref::<client::Refused>();
+        let is_refused = refused.is_some_and(|refused| refused.status < 500);
+        let is_bad_input = error.is::<BadInput>() || is_refused;
+        ExitCode::from(if is_bad_input { 2 } else { 1 })
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cause_that_an_error_names_itself_is_told_once() {
+        let gone = || std::io::Error::other("no such folder");
+        let twice = anyhow::Error::new(gone()).context("cannot read it: no such folder");
+        assert_eq!(told(&twice), "cannot read it: no such folder");
+        let apart = anyhow::Error::new(gone()).context("cannot read it");
+        assert_eq!(told(&apart), "cannot read it: no such folder");
+    }
 }

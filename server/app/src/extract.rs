@@ -3,7 +3,7 @@
 use axum::extract::{FromRef, FromRequest, FromRequestParts, Path};
 use axum::http::request::Parts;
 use axum::http::{HeaderMap, header};
-use store::{Bearer, Labeler, RunId, RunRow, Secret, TokenKind};
+use store::{Bearer, Labeler, RunId, RunRow, Secret, StudyId, StudyRow, TokenKind};
 
 use crate::problem::Problem;
 use crate::state::AppState;
@@ -33,6 +33,26 @@ where
         let number: i64 = id.parse().map_err(|_| Problem::run_not_found(&id))?;
         let run = app.store.run(RunId(number)).await?;
         run.map(Self).ok_or_else(|| Problem::run_not_found(&id))
+    }
+}
+
+/// The study that the address names, as it is now.
+pub struct Study(pub StudyRow);
+
+impl<S: Send + Sync> FromRequestParts<S> for Study
+where
+    AppState: FromRef<S>,
+{
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
+        // Addresses of what belongs to a study have more parts than its number.
+        let Path(path) = Path::<Vec<(String, String)>>::from_request_parts(parts, state).await?;
+        let id = path.into_iter().find(|(key, _)| key == "id");
+        let id = id.map(|(_, id)| id).unwrap_or_default();
+        let number = id.parse().map_err(|_| Problem::study_not_found(&id))?;
+        let app = AppState::from_ref(state);
+        Ok(Self(app.store.study(StudyId(number)).await?))
     }
 }
 

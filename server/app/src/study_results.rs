@@ -10,6 +10,7 @@ use domain::agreement::{
     cohens_kappa, newcombe, self_consistency,
 };
 use lab::figure::{self, FigureError, Request, Source};
+use lab::method::METHODS;
 use serde_json::json;
 use store::{Label, LabelsOf, Store, StoreError, StudyId};
 
@@ -104,11 +105,11 @@ fn shown(value: f64) -> String {
     }
 }
 
-/// Results of a study as the store has it. Before it is closed nothing is told by method.
+/// All answers of a study. Before it is closed none tells its method.
 ///
 /// # Errors
 /// The database cannot be read.
-pub async fn of(store: &Store, study: StudyId) -> Result<Results, StoreError> {
+pub async fn labels(store: &Store, study: StudyId) -> Result<Vec<Label>, StoreError> {
     let (mut labels, mut after) = (Vec::new(), 0);
     loop {
         let page = store.labels(LabelsOf::Study(study), after, PAGE).await?;
@@ -116,31 +117,96 @@ pub async fn of(store: &Store, study: StudyId) -> Result<Results, StoreError> {
         let Some(next) = page.next else { break };
         after = next;
     }
-    Ok(results(&labels))
+    Ok(labels)
 }
 
-/// Results of answers, as they are stored or exported.
+/// Figures and measures of answers, as they are stored or exported. Resampling takes a while.
 pub fn results(labels: &[Label]) -> Results {
-    let current: Vec<&Label> = labels
-        .iter()
-        .filter(|label| label.is_current && label.meaning != "skip")
-        .collect();
-    let counted: Vec<&Label> = with_role(&current, "counted").collect();
-    let mut results = Results {
-        n_answers: counted.len(),
-        ..Results::default()
-    };
+    let (current, counted) = counted(labels);
+    let mut measures = Vec::new();
     if counted.is_empty() {
-        return results;
+        return Results::default();
     }
-    if counted.iter().all(|label| label.question == "preference") {
-        preferences(&counted, &mut results);
+    if are_preferences(&counted) {
+        preferences(&counted, &mut measures);
     } else {
-        same_stage(&counted, &mut results);
+        same_stage(&counted, &mut measures);
     }
-    agreement(&counted, &mut results.measures);
-    labelers(&current, &mut results.measures);
-    results
+    agreement(&counted, &mut measures);
+    labelers(&current, &mut measures);
+    Results {
+        n_answers: counted.len(),
+        figures: figures(labels),
+        measures,
+    }
+}
+
+/// What there is to draw of answers; nothing by method while methods are hidden.
+pub fn figures(labels: &[Label]) -> Vec<ResultFigure> {
+    let (_, counted) = counted(labels);
+    if counted.is_empty() {
+        return Vec::new();
+    }
+    if are_preferences(&counted) {
+        let rows = lines(&counted, |label| {
+            json!({
+                "task": label.task, "t_x": label.first_start, "t_y": label.second_start, "preference": label.meaning,
+            })
+        });
+        return vec![
+            ResultFigure {
+                name: "preference-scatter",
+                caption: "Each answer at the starts of both segments",
+                rows: rows.clone(),
+            },
+            ResultFigure {
+                name: "preference-fit",
+                caption: "Preference for the segment that starts later",
+                rows,
+            },
+        ];
+    }
+    if compared(&counted).is_none() {
+        return Vec::new();
+    }
+    let mut by_method = counted;
+    by_method.sort_by_key(|label| label.method.as_deref().map(rank));
+    let rows = lines(
+        &by_method,
+        |label| json!({"task": label.task, "method": label.method, "same": label.meaning == "same"}),
+    );
+    vec![ResultFigure {
+        name: "same-stage-bars",
+        caption: "Pairs judged to show one stage, by method",
+        rows,
+    }]
+}
+
+/// Answers that no later one replaces and that are no skips, and those of them that count.
+fn counted(labels: &[Label]) -> (Vec<&Label>, Vec<&Label>) {
+    let current = labels.iter();
+    let current = current.filter(|label| label.is_current && label.meaning != "skip");
+    let current: Vec<&Label> = current.collect();
+    let counted = with_role(&current, "counted").collect();
+    (current, counted)
+}
+
+fn are_preferences(counted: &[&Label]) -> bool {
+    counted.iter().all(|label| label.question == "preference")
+}
+
+/// The two methods that a study compares, in the order of the program's list, whoever answered
+/// first; `None` while they are hidden, and of one method.
+fn compared(counted: &[&Label]) -> Option<[String; 2]> {
+    let mut methods = names(counted.iter().filter_map(|label| label.method.as_ref()));
+    methods.sort_by_key(|method| rank(method));
+    methods.try_into().ok()
+}
+
+/// Place of a method in the program's list.
+fn rank(method: &str) -> usize {
+    let known = METHODS.iter().position(|known| known.name == method);
+    known.unwrap_or(METHODS.len())
 }
 
 fn with_role<'l>(labels: &[&'l Label], role: &'static str) -> impl Iterator<Item = &'l Label> {
@@ -149,34 +215,15 @@ fn with_role<'l>(labels: &[&'l Label], role: &'static str) -> impl Iterator<Item
 }
 
 /// Task 1 of the paper: where in its episode the preferred segment starts.
-fn preferences(counted: &[&Label], results: &mut Results) {
-    let rows = lines(counted, |label| {
-        json!({
-            "task": label.task, "t_x": label.first_start, "t_y": label.second_start, "preference": label.meaning,
-        })
-    });
-    results.figures.push(ResultFigure {
-        name: "preference-scatter",
-        caption: "Each answer at the starts of both segments",
-        rows: rows.clone(),
-    });
-    results.figures.push(ResultFigure {
-        name: "preference-fit",
-        caption: "Preference for the segment that starts later",
-        rows,
-    });
+fn preferences(counted: &[&Label], measures: &mut Vec<Measure>) {
     for task in names(counted.iter().map(|label| &label.task)) {
         let own = || counted.iter().filter(|label| label.task == task);
         let ties = Share::of(own().map(|label| label.meaning == "equal"));
-        push_share(&mut results.measures, format!("ties, {task}"), ties);
+        push_share(measures, format!("ties, {task}"), ties);
         let decided = own().filter(|l| l.meaning != "equal" && l.first_start != l.second_start);
         let later =
             Share::of(decided.map(|l| (l.meaning == "second") == (l.second_start > l.first_start)));
-        push_share(
-            &mut results.measures,
-            format!("later segment preferred, {task}"),
-            later,
-        );
+        push_share(measures, format!("later segment preferred, {task}"), later);
     }
     let sided = || {
         counted
@@ -186,12 +233,10 @@ fn preferences(counted: &[&Label], results: &mut Results) {
     let left = Share::of(sided().map(|label| label.pressed == "left"));
     if let Some(estimate) = left.clopper_pearson(LEVEL) {
         let from = format!("{} answers", left.n);
-        results
-            .measures
-            .push(Measure::new("left preferred", estimate, from));
+        measures.push(Measure::new("left preferred", estimate, from));
     }
     if let Some(p) = left.binomial_test(0.5) {
-        results.measures.push(Measure {
+        measures.push(Measure {
             name: "left bias, exact binomial p".into(),
             value: p,
             interval: None,
@@ -201,10 +246,9 @@ fn preferences(counted: &[&Label], results: &mut Results) {
 }
 
 /// Task 2 of the paper: how many of each method's queries show one stage.
-fn same_stage(counted: &[&Label], results: &mut Results) {
+fn same_stage(counted: &[&Label], measures: &mut Vec<Measure>) {
     let is_same = |label: &&Label| label.meaning == "same";
     let tasks = names(counted.iter().map(|label| &label.task));
-    let methods = names(counted.iter().filter_map(|label| label.method.as_ref()));
     let share = |task: &str, method: Option<&str>| {
         let own = counted.iter().filter(|label| {
             label.task == task
@@ -213,41 +257,20 @@ fn same_stage(counted: &[&Label], results: &mut Results) {
         Share::of(own.map(is_same))
     };
     for task in &tasks {
-        push_share(
-            &mut results.measures,
-            format!("same stage, {task}"),
-            share(task, None),
-        );
+        push_share(measures, format!("same stage, {task}"), share(task, None));
     }
-    let [first, second] = methods.as_slice() else {
-        return; // blinded, or a study of one method
+    let Some([first, second]) = compared(counted) else {
+        return;
     };
-    let rows = lines(
-        counted,
-        |label| json!({"task": label.task, "method": label.method, "same": label.meaning == "same"}),
-    );
-    results.figures.push(ResultFigure {
-        name: "same-stage-bars",
-        caption: "Pairs judged to show one stage, by method",
-        rows,
-    });
     let mut strata = Vec::new();
     for task in &tasks {
-        let (a, b) = (share(task, Some(first)), share(task, Some(second)));
-        push_share(
-            &mut results.measures,
-            format!("same stage, {first}, {task}"),
-            a,
-        );
-        push_share(
-            &mut results.measures,
-            format!("same stage, {second}, {task}"),
-            b,
-        );
+        let (a, b) = (share(task, Some(&first)), share(task, Some(&second)));
+        push_share(measures, format!("same stage, {first}, {task}"), a);
+        push_share(measures, format!("same stage, {second}, {task}"), b);
         if let Some(estimate) = newcombe(a, b, LEVEL) {
             let name = format!("{first} − {second}, {task}");
             let from = format!("{} answers", a.n + b.n);
-            results.measures.push(Measure::new(name, estimate, from));
+            measures.push(Measure::new(name, estimate, from));
         }
         strata.push(Stratum {
             first: a,
@@ -263,16 +286,16 @@ fn same_stage(counted: &[&Label], results: &mut Results) {
     if let Some(test) = cochran_mantel_haenszel(&strata, Continuity::Corrected, LEVEL) {
         if let Some(estimate) = test.odds_ratio {
             let name = format!("odds of same stage, {first} over {second}");
-            results.measures.push(Measure::new(name, estimate, from()));
+            measures.push(Measure::new(name, estimate, from()));
         }
-        results.measures.push(Measure {
+        measures.push(Measure {
             name: "Cochran–Mantel–Haenszel p".into(),
             value: test.p,
             interval: None,
             from: from(),
         });
     }
-    by_labeler(counted, (first, second), &mut results.measures);
+    by_labeler(counted, (&first, &second), measures);
 }
 
 /// The difference of two methods with labelers as what is independent.

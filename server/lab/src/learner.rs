@@ -203,9 +203,11 @@ impl Learner {
         }
     }
 
-    /// Lets the agent's learning rates fall with the part of the run that is behind, [0, 1].
+    /// Lets the agent's and the reward's learning rates fall with the part of the run that is
+    /// behind, [0, 1].
     pub(crate) fn anneal(&mut self, done: f64) {
         self.agent.anneal(done);
+        self.reward.anneal(done);
     }
 
     /// Actions sampled from the policy, `[n × A]`.

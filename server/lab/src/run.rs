@@ -1,47 +1,41 @@
 //! Algorithm 1: act, ask, learn. One loop for every method.
 
-use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, TryRecvError};
 use std::time::Duration;
 
-use domain::environment::{EnvError, EnvSpec};
+use domain::environment::EnvSpec;
 use domain::query::Query;
 use domain::random::{Rng, Stream};
 use domain::sampler::{QuerySampler, Uniform};
 use domain::schedule::Every;
-use domain::teacher::{Teacher, TeacherError};
-use learn::LearnError;
+use domain::teacher::Teacher;
 use learn::beliefs::LearnedBeliefs;
-use learn::checkpoint::Archive;
-use learn::device::Device;
-use learn::replay::{BatchRule, Replay, ReplayMark};
+use learn::replay::{BatchRule, Replay};
 use learn::reward::{Estimate, Labeled, SteeringConfig};
 use serde::{Deserialize, Serialize};
 
 use crate::candidates::Pool;
-use crate::config::{ConfigError, RunConfig, WhileWaiting, find_task};
-use crate::evaluate::{Trial, correlation, evaluate};
+use crate::config::{RunConfig, WhileWaiting};
 use crate::folder::RunFolder;
-use crate::lanes::{Lanes, LanesState};
+use crate::lanes::Lanes;
 use crate::learner::{Due, Learner};
-use crate::memory::{self, MemoryNeed, TooLittleMemory, shape};
-use crate::message::{
-    Activity, Checkpointed, Command, Demonstration, Evaluation, Event, Finished, Phase,
-    SessionClosed,
-};
+use crate::message::{Activity, Command, Event, Finished, SessionClosed};
 use crate::meter::Meter;
-use crate::method::{self, Method};
+use crate::method::Method;
 use crate::preferences::{AnswerState, Preferences};
 use crate::session::{Selection, Session};
+
+mod disk;
+mod error;
+mod telling;
+
+pub use error::RunError;
 
 /// How long the loop rests when there is nothing to do but wait for people.
 const REST: Duration = Duration::from_millis(20);
 
 /// Newest episodes by which scripted teachers measure, as in B-Pref.
 const TYPICAL_EPISODES: usize = 10;
-
-/// Held-out episodes are the same for every run, so that runs can be compared.
-const HELD_OUT: u64 = 0;
 
 /// A run: an agent, its experience, and what is known of the answers.
 pub struct Run {
@@ -81,203 +75,7 @@ pub enum Outcome {
     Stopped,
 }
 
-/// Why a run cannot go on.
-#[derive(Debug, thiserror::Error)]
-pub enum RunError {
-    /// Settings that cannot be used.
-    #[error(transparent)]
-    Config(#[from] ConfigError),
-    /// Tensors, devices and checkpoints.
-    #[error(transparent)]
-    Learn(#[from] LearnError),
-    /// A simulation that failed.
-    #[error(transparent)]
-    Environment(#[from] EnvError),
-    /// A teacher that cannot be asked.
-    #[error("the teacher cannot go on: {0}")]
-    Teacher(#[from] TeacherError),
-    /// A run that this machine cannot hold.
-    #[error(transparent)]
-    Memory(#[from] TooLittleMemory),
-    /// A checkpoint and the folder's settings that do not belong together.
-    #[error(
-        "{path} was written with {key} = {checkpoint}, but config.toml beside it says {settings}; put {checkpoint} back there to go on with it, or start a new run elsewhere", path = path.display()
-    )]
-    OtherSettings {
-        /// The checkpoint.
-        path: PathBuf,
-        /// Dotted path of the setting.
-        key: &'static str,
-        /// Its value in the checkpoint.
-        checkpoint: String,
-        /// Its value in the folder.
-        settings: String,
-    },
-    /// The disk.
-    #[error("cannot {doing} ({path}): {source}")]
-    Io {
-        /// What was tried.
-        doing: &'static str,
-        /// Where.
-        path: PathBuf,
-        /// What the system said.
-        source: std::io::Error,
-    },
-    /// A new run where one is already.
-    #[error("{folder} holds a run already; resume it or choose another folder")]
-    Occupied {
-        /// Where.
-        folder: PathBuf,
-    },
-    /// None of the checkpoints can be read.
-    #[error("no checkpoint in {folder} can be used: {reasons}")]
-    NoCheckpoint {
-        /// Where.
-        folder: PathBuf,
-        /// What each said.
-        reasons: String,
-    },
-}
-
 impl Run {
-    /// Makes a run's folder and its first checkpoint.
-    ///
-    /// # Errors
-    /// [`RunError`]; nothing is started.
-    pub fn start(config: RunConfig, folder: &Path) -> Result<Self, RunError> {
-        let task = find_task(&config.task)?;
-        let spec = (task.spec)();
-        let method = method::build(&config)?;
-        let device = Device::open(&config.device)?;
-        if let Some(bytes) = memory::available() {
-            MemoryNeed::of(&config, &spec, &method).check(&spec, bytes)?;
-        }
-        let learner = Learner::new(&config, &spec, &method, device);
-        let mut replay = Replay::new(shape(&spec), config.environment.n_envs);
-        if method.bonus.is_some() {
-            replay.keep_disagreement();
-        }
-        let lanes = Lanes::start(task, config.environment.n_envs, config.seed, &mut replay);
-        let folder = RunFolder::create(folder)?;
-        let mut run = Self {
-            task,
-            spec,
-            method,
-            folder,
-            lanes,
-            replay,
-            learner,
-            preferences: Preferences::default(),
-            session: None,
-            progress: Progress::default(),
-            meter: Meter::default(),
-            is_paused: false,
-            last_activity: None,
-            config,
-        };
-        run.checkpoint()?;
-        run.folder.seal(&run.config.to_toml())?;
-        Ok(run)
-    }
-
-    /// Whether a run was started in this folder, so that [`Run::resume`] can take it up.
-    pub fn exists(folder: &Path) -> bool {
-        RunFolder::holds_run(folder)
-    }
-
-    /// Takes a run up again from its newest checkpoint that can be read. Returns what was
-    /// wrong with newer ones, for the person who reads the log.
-    ///
-    /// # Errors
-    /// [`RunError`]; nothing is changed.
-    pub fn resume(folder: &Path) -> Result<(Self, Vec<String>), RunError> {
-        Self::resume_on(folder, None)
-    }
-
-    /// The same on another device than the settings name; a checkpoint fits any.
-    ///
-    /// # Errors
-    /// [`RunError`]; nothing is changed.
-    pub fn resume_on(folder: &Path, device: Option<&str>) -> Result<(Self, Vec<String>), RunError> {
-        let (run_folder, text) = RunFolder::open(folder)?;
-        let mut config = RunConfig::parse("config.toml", &text)?;
-        if let Some(device) = device {
-            device.clone_into(&mut config.device);
-        }
-        Device::open(&config.device)?; // before a checkpoint could be blamed for it
-        let mut complaints = Vec::new();
-        let steps = run_folder.checkpoints()?;
-        let mut run_folder = Some(run_folder);
-        for step in steps.into_iter().rev() {
-            let opened = match run_folder.take() {
-                Some(folder) => folder,
-                None => RunFolder::open(folder)?.0,
-            };
-            match Self::restore(config.clone(), opened, step) {
-                Ok(run) => return Ok((run, complaints)),
-                Err(error @ RunError::OtherSettings { .. }) => return Err(error),
-                Err(error) => complaints.push(format!("checkpoint of step {step}: {error}")),
-            }
-        }
-        let reasons = if complaints.is_empty() {
-            "there is none".into()
-        } else {
-            complaints.join("; ")
-        };
-        Err(RunError::NoCheckpoint {
-            folder: folder.to_owned(),
-            reasons,
-        })
-    }
-
-    fn restore(config: RunConfig, mut folder: RunFolder, step: u64) -> Result<Self, RunError> {
-        let path = folder.checkpoint_path(step);
-        let archive = Archive::read(&path)?;
-        let written = archive.json::<String>("config")?;
-        let written = RunConfig::parse("the checkpoint's settings", &written)?;
-        if let Some((key, checkpoint, settings)) = written.first_misfit(&config) {
-            return Err(RunError::OtherSettings {
-                path,
-                key,
-                checkpoint,
-                settings,
-            });
-        }
-        let task = find_task(&config.task)?;
-        let spec = (task.spec)();
-        let method = method::build(&config)?;
-        let mut learner = Learner::new(&config, &spec, &method, Device::open(&config.device)?);
-        learner.load(&archive)?;
-        let lanes = Lanes::restore(task, config.seed, archive.json::<LanesState>("lanes")?)?;
-        let mark: ReplayMark = archive.json("replay")?;
-        let mut replay = Replay::open(
-            &folder.replay(),
-            shape(&spec),
-            config.environment.n_envs,
-            &mark,
-        )?;
-        if method.bonus.is_some() {
-            replay.keep_disagreement(); // an empty column says nothing about itself
-        }
-        folder.cut_metrics(archive.json("metrics_len")?)?;
-        Ok(Self {
-            preferences: archive.json("preferences")?,
-            session: archive.json("session")?,
-            progress: archive.json("progress")?,
-            task,
-            spec,
-            method,
-            folder,
-            lanes,
-            replay,
-            learner,
-            meter: Meter::default(),
-            is_paused: false,
-            last_activity: None,
-            config,
-        })
-    }
-
     /// The resolved settings.
     pub fn config(&self) -> &RunConfig {
         &self.config
@@ -609,157 +407,5 @@ impl Run {
         let mut labeled = self.preferences.labeled(self.config.queries.train_on_equal);
         let n = self.config.feedback.queries_per_session as usize;
         labeled.split_off(labeled.len().saturating_sub(n))
-    }
-
-    fn evaluate(&mut self, events: &mut dyn FnMut(Event)) -> Result<(), RunError> {
-        let trial = self.trial(self.config.evaluation.episodes)?;
-        self.progress.last_evaluation = Some((trial.success_rate(), trial.return_mean()));
-        let event = Event::Evaluation(Evaluation {
-            step: self.progress.step,
-            labels: self.preferences.n_preferred(),
-            episodes: self.config.evaluation.episodes,
-            success_rate: trial.success_rate(),
-            return_mean: trial.return_mean(),
-            return_std: trial.return_std(),
-            reward_correlation: self.reward_correlation(&trial),
-        });
-        self.say(event, events)
-    }
-
-    fn trial(&self, n_episodes: u32) -> Result<Trial, RunError> {
-        let mut policy = |observations: &[f32], _: u32| self.learner.act_mean(observations);
-        Ok(evaluate(self.task, n_episodes, HELD_OUT, &mut policy)?)
-    }
-
-    fn reward_correlation(&self, trial: &Trial) -> Option<f64> {
-        if self.progress.n_fits == 0 {
-            return None;
-        }
-        let learned = self
-            .learner
-            .reward
-            .predict(&trial.kept.observations, &trial.kept.actions);
-        let learned: Vec<f64> = learned.into_iter().map(f64::from).collect();
-        correlation(&learned, &trial.kept.task_rewards)
-    }
-
-    fn demonstrate(
-        &mut self,
-        session: Option<u32>,
-        events: &mut dyn FnMut(Event),
-    ) -> Result<(), RunError> {
-        let trial = self.trial(1)?;
-        events(Event::Demonstration(Demonstration {
-            session,
-            step: self.progress.step,
-            success: trial.success_rate() > 0.0,
-            task_return: trial.return_mean(),
-            poses: trial.poses,
-        }));
-        Ok(())
-    }
-
-    fn finish(&mut self, events: &mut dyn FnMut(Event)) -> Result<Outcome, RunError> {
-        let is_evaluated = self
-            .progress
-            .step
-            .is_multiple_of(self.config.evaluation.every.max(1));
-        if !is_evaluated || self.progress.last_evaluation.is_none() {
-            self.evaluate(events)?;
-        }
-        self.demonstrate(None, events)?;
-        let (success_rate, return_mean) = self.progress.last_evaluation.unwrap_or_default();
-        let finished = Finished {
-            step: self.progress.step,
-            labels: self.preferences.n_preferred(),
-            success_rate,
-            return_mean,
-            weights: self.learner.fingerprint(),
-        };
-        self.leave_policy()?;
-        self.say(Event::Finished(finished.clone()), events)?;
-        self.checkpoint_and_say(events)?;
-        Ok(Outcome::Finished(finished))
-    }
-
-    fn leave_policy(&self) -> Result<(), RunError> {
-        let mut archive = Archive::new();
-        self.learner.save_policy(&mut archive);
-        archive.put_json("config", &self.config.to_toml());
-        Ok(archive.write(&self.folder.policy_path())?)
-    }
-
-    fn checkpoint_and_say(&mut self, events: &mut dyn FnMut(Event)) -> Result<(), RunError> {
-        self.checkpoint()?;
-        let Progress {
-            step,
-            consumed_sequence,
-            ..
-        } = self.progress;
-        events(Event::Checkpointed(Checkpointed {
-            step,
-            consumed_sequence,
-        }));
-        Ok(())
-    }
-
-    fn checkpoint(&mut self) -> Result<(), RunError> {
-        let mut archive = Archive::new();
-        self.learner.save(&mut archive);
-        archive.put_json("config", &self.config.to_toml());
-        archive.put_json("lanes", &self.lanes.state());
-        archive.put_json("replay", &self.replay.sync(&self.folder.replay())?);
-        archive.put_json("preferences", &self.preferences);
-        archive.put_json("session", &self.session);
-        archive.put_json("progress", &self.progress);
-        archive.put_json("metrics_len", &self.folder.sync_metrics()?);
-        self.folder.save(self.progress.step, &archive)
-    }
-
-    fn say(&mut self, event: Event, events: &mut dyn FnMut(Event)) -> Result<(), RunError> {
-        self.folder.record(&event)?;
-        events(event);
-        Ok(())
-    }
-
-    fn say_activity(&mut self, events: &mut dyn FnMut(Event)) {
-        let activity = if self.is_paused {
-            Activity::Paused
-        } else if self.session.is_some() && self.stands_still() {
-            Activity::Asking
-        } else if self.progress.n_fits == 0 && self.method.sampler.is_some() {
-            Activity::Exploring
-        } else {
-            Activity::Learning
-        };
-        if !self
-            .meter
-            .is_time_to_say(self.last_activity != Some(activity))
-        {
-            return;
-        }
-        self.last_activity = Some(activity);
-        let (feedback, n_sessions) = (&self.config.feedback, self.progress.n_sessions);
-        let from_step = n_sessions
-            .checked_sub(1)
-            .map_or(0, |last| feedback.step_of(last));
-        let next = feedback.step_of(n_sessions);
-        let asks_again = self.method.sampler.is_some()
-            && self.preferences.n_preferred() < feedback.budget
-            && next < self.config.training.total_steps;
-        let until = if asks_again {
-            next
-        } else {
-            self.config.training.total_steps
-        };
-        events(Event::Phase(Phase {
-            activity,
-            step: self.progress.step,
-            total_steps: self.config.training.total_steps,
-            from_step,
-            until_step: matches!(activity, Activity::Exploring | Activity::Learning)
-                .then_some(until),
-            session_answers: self.session.as_ref().map(|s| s.progress(&self.preferences)),
-        }));
     }
 }

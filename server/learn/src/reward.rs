@@ -1,7 +1,6 @@
 //! The reward ensemble: per-step rewards learned from preferences between segments.
 
 use domain::answer::Preference;
-use domain::episode::Segment;
 use domain::query::Query;
 use domain::random::{Rng, Stream};
 use serde::{Deserialize, Serialize};
@@ -15,10 +14,13 @@ use crate::net::{Net, NetShape, Parameters, matrix, to_vec};
 use crate::precision::Precision;
 use crate::replay::Replay;
 
+mod chunk;
 mod denoise;
 mod learner;
 mod meta;
 mod semi;
+
+use chunk::{Chunk, longest};
 
 pub use denoise::{Denoising, DenoisingConfig};
 pub use learner::{Lesson, RewardLearner, Supervised};
@@ -37,6 +39,10 @@ pub struct RewardConfig {
     ///
     /// Differs from the paper: its table says 1e-4, the released code uses 3e-4.
     pub learning_rate: f64,
+    /// Share of the rate that is left at the end of a run, (0, 1]; it falls evenly. 1 keeps it.
+    ///
+    /// The more answers there are, the less should a session of few more move what all say.
+    pub final_rate: f64,
     /// Pairs in a minibatch.
     pub batch: usize,
     /// Passes over all preferences after a session, at most.
@@ -51,8 +57,8 @@ pub struct RewardConfig {
     /// Divides the difference of two segments' sums in P = σ(Δ / temperature), above 0.
     ///
     /// At 1 a preference between segments of 50 steps is certain once they differ by a tenth a
-    /// step, and nothing drives learned rewards further apart; a temperature in the order of the
-    /// segment's length makes them spread over the whole of (−1, 1).
+    /// step, and nothing drives learned rewards further apart. Higher ones do spread them, but
+    /// let them drift together to one end of (−1, 1): with 10 window-open was not learned.
     ///
     /// Differs from the paper: its Eq. 1 has none, which is 1.
     pub temperature: f64,
@@ -73,6 +79,7 @@ impl Default for RewardConfig {
             members: 3,
             hidden: vec![256; 3],
             learning_rate: 3e-4,
+            final_rate: 1.0,
             batch: 128,
             max_epochs: 10,
             stop_accuracy: 0.97,
@@ -160,6 +167,8 @@ pub struct RewardEnsemble {
     net: Net,
     gradient: Net,
     scale: Scale,
+    /// Share of the learning rate that is left.
+    rate: f64,
     n_epochs: u64,
 }
 
@@ -271,8 +280,15 @@ impl RewardEnsemble {
             parameters,
             net,
             scale: Scale::NONE,
+            rate: 1.0,
             n_epochs: 0,
         }
+    }
+
+    /// Lets the learning rate fall to [`RewardConfig::final_rate`]; `done` is the part of the run
+    /// that is behind, [0, 1]. It follows from the step, so no checkpoint holds it.
+    pub fn anneal(&mut self, done: f64) {
+        self.rate = 1.0 + done.clamp(0.0, 1.0) * (self.config.final_rate - 1.0);
     }
 
     /// Goes on from the present weights, over all preferences so far, until the members are
@@ -312,7 +328,7 @@ impl RewardEnsemble {
         for start in (0..labeled.len()).step_by(self.config.batch) {
             let end = labeled.len().min(start + self.config.batch);
             self.gradient(replay, labeled, &mut passes, start..end);
-            self.parameters.step_at(rate);
+            self.parameters.step_at(self.rate * rate);
         }
         passes
     }
@@ -352,7 +368,7 @@ impl RewardEnsemble {
     fn step(&mut self, replay: &Replay, examples: &[Example]) -> Vec<f64> {
         self.parameters.zero_gradient();
         let logits = self.add_gradient(replay, examples);
-        self.parameters.step();
+        self.parameters.step_at(self.rate);
         logits
     }
 
@@ -576,68 +592,6 @@ pub(crate) fn entropy(probabilities: &[Vec<f32>]) -> Vec<f32> {
     };
     let mean = |query: usize| probabilities.iter().map(|m| own(m[query])).sum::<f32>() / n_members;
     (0..n_queries).map(mean).collect()
-}
-
-/// Rows of several pairs, first then second segment, each padded to the longest.
-struct Chunk {
-    /// `[2 · pairs · longest × (S + A)]`.
-    rows: Vec<f32>,
-    /// Steps of each segment.
-    lens: Vec<usize>,
-    longest: usize,
-    temperature: f64,
-}
-
-impl Chunk {
-    fn gather<'a>(
-        replay: &Replay,
-        queries: impl Iterator<Item = &'a Query>,
-        longest: usize,
-        temperature: f64,
-    ) -> Self {
-        let shape = replay.shape();
-        let segment_len = longest * (shape.observation + shape.action);
-        let (mut rows, mut lens) = (Vec::new(), Vec::new());
-        for segment in queries.flat_map(|query| [query.first, query.second]) {
-            replay.append_segment_rows(segment, &mut rows);
-            lens.push(segment.len as usize);
-            rows.resize(lens.len() * segment_len, 0.0);
-        }
-        Self {
-            rows,
-            lens,
-            longest,
-            temperature,
-        }
-    }
-
-    /// (Σ r(second) − Σ r(first)) / temperature of each pair, from one number a row.
-    fn logits(&self, rewards: &[f32]) -> Vec<f64> {
-        let sum =
-            |(reward, &len): (&[f32], &usize)| reward[..len].iter().copied().map(f64::from).sum();
-        let sums: Vec<f64> = rewards
-            .chunks(self.longest)
-            .zip(&self.lens)
-            .map(sum)
-            .collect();
-        let logit = |pair: &[f64]| (pair[1] - pair[0]) / self.temperature;
-        sums.chunks_exact(2).map(logit).collect()
-    }
-
-    /// What each row's reward adds to the loss, from what each pair's logit does.
-    fn row_slopes(&self, slopes: &[f64]) -> Vec<f32> {
-        let mut rows = vec![0.0; self.lens.len() * self.longest];
-        for (index, (rows, &len)) in rows.chunks_mut(self.longest).zip(&self.lens).enumerate() {
-            let sign = if index % 2 == 0 { -1.0 } else { 1.0 };
-            rows[..len].fill((sign * slopes[index / 2] / self.temperature) as f32);
-        }
-        rows
-    }
-}
-
-fn longest(query: &Query) -> usize {
-    let len = |segment: Segment| segment.len as usize;
-    len(query.first).max(len(query.second)).max(1)
 }
 
 /// ln(1 + eˣ) without overflow.

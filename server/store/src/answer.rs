@@ -1,7 +1,7 @@
 //! Answers: stored once however often they are sent, never changed, superseded by newer rows.
 
-use domain::answer::{Answer, Preference, StageJudgement, Which};
-use domain::query::{QueryKey, Question};
+use domain::answer::{Answer, Preference, Which};
+use domain::query::QueryKey;
 use domain::teacher::Answered;
 use serde_json::json;
 use sqlx::Row as _;
@@ -13,6 +13,7 @@ use crate::event;
 use crate::labeler::{LabelerId, SERVER};
 use crate::lease::question;
 use crate::notice::Notice;
+use crate::pressed::Pressed;
 use crate::query::{QueryId, which, word};
 use crate::run::RunId;
 use crate::secret::random_name;
@@ -20,65 +21,6 @@ use crate::store::Store;
 use crate::study::{check_open, turn_role};
 use crate::time::now_ms;
 use crate::writer::Transaction;
-
-/// The word of an answer, parsed for the question it answers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Pressed {
-    /// To "which is better?".
-    Preference(Answer),
-    /// To "same stage?".
-    SameStage(StageJudgement),
-}
-
-impl Pressed {
-    /// The word for a question.
-    ///
-    /// # Errors
-    /// [`StoreError::WrongQuestion`] names the words that the question takes.
-    pub fn parse(asked: Question, text: &str) -> Result<Self, StoreError> {
-        use serde::de::value::{Error, StrDeserializer};
-        use serde::{Deserialize as _, de::IntoDeserializer as _};
-        let word: StrDeserializer<'_, Error> = text.into_deserializer();
-        let (parsed, question, takes) = match asked {
-            Question::Preference => (
-                Answer::deserialize(word).map(Self::Preference),
-                "preference",
-                "left, right, equal or skip",
-            ),
-            Question::SameStage => (
-                StageJudgement::deserialize(word).map(Self::SameStage),
-                "same_stage",
-                "same, different or skip",
-            ),
-        };
-        parsed.map_err(|_| StoreError::WrongQuestion {
-            pressed: text.to_owned(),
-            question,
-            takes,
-        })
-    }
-
-    /// The word itself.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Preference(Answer::Left) => "left",
-            Self::Preference(Answer::Right) => "right",
-            Self::Preference(Answer::Equal) => "equal",
-            Self::SameStage(StageJudgement::Same) => "same",
-            Self::SameStage(StageJudgement::Different) => "different",
-            Self::Preference(Answer::Skip) | Self::SameStage(StageJudgement::Skip) => "skip",
-        }
-    }
-
-    /// What the word means, whatever the sides: `first`, `second`, or the word itself.
-    fn meaning(self, left_is: Which) -> &'static str {
-        match self {
-            Self::Preference(Answer::Left) => word(left_is),
-            Self::Preference(Answer::Right) => word(left_is.other()),
-            other => other.word(),
-        }
-    }
-}
 
 /// How a labeler came to an answer.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -123,9 +123,7 @@ pub enum StoreError {
         told: &'static str,
     },
     /// A study has no place left to give.
-    #[error(
-        "every pair is answered by {most} labelers, and {invited} are invited already; no more can be"
-    )]
+    #[error("there are places for {most} labelers, and {invited} of them are given out: {}", left(*most, *invited))]
     NoSeatLeft {
         /// Seats at most.
         most: u32,
@@ -138,6 +136,13 @@ pub enum StoreError {
     /// Somebody else took the lease; the answer is kept aside.
     #[error("the lease ran out and somebody else has the question now; the answer is kept aside")]
     Taken,
+}
+
+fn left(most: u32, invited: u32) -> String {
+    match most.saturating_sub(invited) {
+        0 => "no more can be invited".to_owned(),
+        n => format!("{n} more can be invited"),
+    }
 }
 
 /// What is wrong with a link into a study.

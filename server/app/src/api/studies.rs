@@ -1,8 +1,7 @@
 //! `/api/v1/studies`: prepare, look at, open, invite, close.
 
 use axum::Json;
-use axum::extract::{FromRef, FromRequestParts, Path, State};
-use axum::http::request::Parts;
+use axum::extract::{Path, Query, State};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse as _, Response};
 use domain::query::Question;
@@ -12,8 +11,9 @@ use store::{LabelsOf, NewStudy, Seat, Secret, StoreError, StudyId, StudyRow, now
 use utoipa::ToSchema;
 
 use super::labels::{Format, exported};
-use crate::extract::Body;
+use crate::extract::{Body, Study};
 use crate::live::parse_study;
+use crate::pages::in_worker;
 use crate::problem::Problem;
 use crate::state::AppState;
 use crate::study_results;
@@ -21,25 +21,6 @@ use crate::study_results;
 const DAY_MS: i64 = 24 * 60 * 60 * 1000;
 /// Days for which a link works, unless said otherwise, and at most.
 pub const DAYS: (u32, u32) = (14, 365);
-
-/// The study that the address names, as it is now.
-pub struct Study(pub StudyRow);
-
-impl<S: Send + Sync> FromRequestParts<S> for Study
-where
-    AppState: FromRef<S>,
-{
-    type Rejection = Problem;
-
-    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
-        let app = AppState::from_ref(state);
-        let Path(path) = Path::<Vec<(String, String)>>::from_request_parts(parts, state).await?;
-        let id = path.into_iter().find(|(key, _)| key == "id");
-        let id = id.map(|(_, id)| id).unwrap_or_default();
-        let number = id.parse().map_err(|_| Problem::study_not_found(&id))?;
-        Ok(Self(app.store.study(StudyId(number)).await?))
-    }
-}
 
 /// A study to be prepared: a ready one, or a file's text.
 #[derive(Debug, Default, Deserialize, ToSchema)]
@@ -286,7 +267,7 @@ pub async fn invite(
             detail,
         ));
     }
-    let expires_at_ms = now_ms() + i64::from(days) * DAY_MS;
+    let expires_at_ms = until(days);
     let made = match request.seat {
         Some(seat) => {
             let secret = app
@@ -306,6 +287,11 @@ pub async fn invite(
         })
         .collect();
     Ok((StatusCode::CREATED, Json(links)).into_response())
+}
+
+/// When a link that works for so many days from now on runs out, milliseconds since 1970.
+pub fn until(days: u32) -> i64 {
+    now_ms() + i64::from(days) * DAY_MS
 }
 
 /// New places with their secrets.
@@ -343,7 +329,7 @@ pub fn link(headers: &HeaderMap, secret: &Secret) -> String {
 pub async fn labels(
     State(app): State<AppState>,
     Study(study): Study,
-    axum::extract::Query(format): axum::extract::Query<Format>,
+    Query(format): Query<Format>,
 ) -> Result<Response, Problem> {
     let name = format!("study-{}-labels", study.id);
     exported(&app, LabelsOf::Study(study.id), &name, &format)
@@ -361,16 +347,16 @@ pub async fn figure(
     Study(study): Study,
     Path(path): Path<(String, String)>,
 ) -> Result<Response, Problem> {
-    let results = study_results::of(&app.store, study.id).await?;
-    let wanted = path.1.strip_suffix(".svg").unwrap_or(&path.1);
-    let found = results
-        .figures
-        .into_iter()
-        .find(|figure| figure.name == wanted);
-    let found = found.ok_or_else(|| Problem::no_such_page(&format!("The figure {wanted}")))?;
-    let svg = found
-        .draw()
-        .map_err(|error| Problem::unreadable_results(error.to_string()))?;
+    let labels = study_results::labels(&app.store, study.id).await?;
+    let name = path.1.strip_suffix(".svg").unwrap_or(&path.1).to_owned();
+    let unknown = Problem::no_such_page(&format!("The figure {name}"));
+    let drawn = in_worker(move || {
+        let figures = study_results::figures(&labels);
+        let found = figures.into_iter().find(|figure| figure.name == name);
+        found.map(|figure| figure.draw())
+    });
+    let svg = drawn.await?.ok_or(unknown)?;
+    let svg = svg.map_err(|error| Problem::unreadable_results(error.to_string()))?;
     Ok(([(header::CONTENT_TYPE, "image/svg+xml")], svg).into_response())
 }
 

@@ -8,7 +8,7 @@ use lab::experiment::Artifact;
 
 use super::experiments::state;
 use super::markdown::to_html;
-use super::{show, thousands};
+use super::{in_worker, show, thousands};
 use crate::experiments::{self, Experiment, Running};
 use crate::problem::Problem;
 use crate::state::AppState;
@@ -105,17 +105,6 @@ pub async fn file(
 fn find(app: &AppState, name: &str) -> Result<Experiment, Problem> {
     let found = experiments::find(app.store.folder(), name);
     found.ok_or_else(|| Problem::experiment_not_found(name))
-}
-
-/// Reading rows and making a report takes milliseconds to seconds: not on the threads that serve.
-pub(super) async fn in_worker<T: Send + 'static>(
-    work: impl FnOnce() -> T + Send + 'static,
-) -> Result<T, Problem> {
-    let done = tokio::task::spawn_blocking(work).await;
-    done.map_err(|error| {
-        tracing::error!("a page's worker ended: {error}");
-        Problem::internal()
-    })
 }
 
 fn as_file(name: &str, text: String) -> Response {

@@ -4,8 +4,7 @@ use askama::Template;
 use axum::extract::State;
 use axum::response::Response;
 
-use super::experiment::in_worker;
-use super::{show, thousands};
+use super::{in_worker, show, thousands};
 use crate::experiments::{self, Experiment};
 use crate::problem::Problem;
 use crate::state::AppState;

@@ -2,7 +2,7 @@
 
 use askama::Template;
 use axum::extract::{Form, Query, State};
-use axum::http::header;
+use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse as _, Redirect, Response};
 use serde::Deserialize;
 use store::{LinkTrouble, Secret, StoreError, now_ms};
@@ -35,6 +35,8 @@ struct ReturnPage {
     heading: &'static str,
     /// What is wrong with the link; empty without one.
     told: String,
+    /// Somebody may have begun in this browser.
+    can_go_on: bool,
 }
 
 #[derive(Template)]
@@ -62,6 +64,7 @@ pub async fn page(
         return Ok(show(&ReturnPage {
             heading: "Go on where you were",
             told: String::new(),
+            can_go_on: true,
         }));
     };
     let entrance = match app.store.entrance(&Secret::brought(&code), now_ms()).await {
@@ -99,7 +102,18 @@ fn turned_away(trouble: LinkTrouble) -> ReturnPage {
     ReturnPage {
         heading,
         told: told + ".",
+        can_go_on: true,
     }
+}
+
+/// For a browser in which nobody takes part: 404, with the place to enter a return code.
+pub(super) fn nobody_here() -> Response {
+    let page = ReturnPage {
+        heading: "Go on where you were",
+        told: "You take part in no study in this browser. Open the link that you were sent, or come back with your return code.".to_owned(),
+        can_go_on: false,
+    };
+    (StatusCode::NOT_FOUND, show(&page)).into_response()
 }
 
 /// The code of a link, with the labeler's agreement.
@@ -148,6 +162,7 @@ pub async fn come_back(
         Err(StoreError::Link(LinkTrouble::Unknown)) => Ok(show(&ReturnPage {
             heading: "Go on where you were",
             told: "That is no return code. It has twelve letters and digits; dashes and capitals do not matter.".to_owned(),
+            can_go_on: true,
         })),
         Err(StoreError::Link(trouble)) => Ok(show(&turned_away(trouble))),
         Err(error) => Err(error.into()),

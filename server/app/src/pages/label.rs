@@ -9,6 +9,7 @@ use serde::Deserialize;
 use store::{RunRow, StudyRow};
 
 use super::guidance::{Guidance, guidance, guidance_with, text};
+use super::join::nobody_here;
 use super::{show, thousands, title};
 use crate::api::labelers;
 use crate::extract::{Run, labeler};
@@ -56,10 +57,10 @@ pub struct NameForm {
 }
 
 /// `GET /runs/{id}/label`; asks for a name first where this browser has none. Questions of a
-/// study are for the labeler who sits there.
+/// study are for the labeler who sits there; anybody else is shown the way back in.
 ///
 /// # Errors
-/// A run that does not exist, or somebody else's; a store that cannot be read.
+/// A run that does not exist; a store that cannot be read.
 pub async fn page(
     State(app): State<AppState>,
     Run(run): Run,
@@ -67,17 +68,24 @@ pub async fn page(
 ) -> Result<Response, Problem> {
     let labeler = labeler(&app, &headers).await?;
     if let Some(study) = run.study {
-        let who = labeler.ok_or_else(Problem::no_seat)?;
-        let seat = app.store.seat_of(who.id).await?;
-        let (study, _, parts) = seat
-            .filter(|(row, _, _)| row.id == study)
-            .ok_or_else(Problem::no_seat)?;
-        if !parts.iter().any(|part| part.run == run.id) {
-            return Err(Problem::no_seat());
-        }
-        return Ok(show(&of_study(&run, &study)?));
+        let seat = match labeler {
+            Some(who) => app.store.seat_of(who.id).await?,
+            None => None,
+        };
+        let seat = seat.filter(|(row, _, parts)| {
+            row.id == study && parts.iter().any(|part| part.run == run.id)
+        });
+        return match seat {
+            Some((study, ..)) => Ok(show(&of_study(&run, &study)?)),
+            None => Ok(nobody_here()),
+        };
     }
-    if labeler.is_none() {
+    // Whoever was invited to a study says another name for anything else.
+    let has_name = match labeler {
+        Some(labeler) => app.store.seat_of(labeler.id).await?.is_none(),
+        None => false,
+    };
+    if !has_name {
         return Ok(show(&NamePage {
             run: run.id.to_string(),
         }));

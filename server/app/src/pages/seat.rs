@@ -6,6 +6,7 @@ use axum::http::HeaderMap;
 use axum::response::Response;
 use store::Part;
 
+use super::join::nobody_here;
 use super::{show, title};
 use crate::extract::labeler;
 use crate::problem::Problem;
@@ -34,14 +35,18 @@ struct PartLine {
 
 /// `GET /seat`
 ///
+/// In a browser whose labeler sits in no study, the way back in.
+///
 /// # Errors
-/// A browser whose labeler sits in no study.
+/// A store that cannot be read.
 pub async fn page(State(app): State<AppState>, headers: HeaderMap) -> Result<Response, Problem> {
-    let labeler = labeler(&app, &headers)
-        .await?
-        .ok_or_else(Problem::no_seat)?;
-    let seat = app.store.seat_of(labeler.id).await?;
-    let (study, _, parts) = seat.ok_or_else(Problem::no_seat)?;
+    let seat = match labeler(&app, &headers).await? {
+        Some(labeler) => app.store.seat_of(labeler.id).await?,
+        None => None,
+    };
+    let Some((study, _, parts)) = seat else {
+        return Ok(nobody_here());
+    };
     let next = parts.iter().find(|part| !part.is_done);
     Ok(show(&SeatPage {
         title: study.title,

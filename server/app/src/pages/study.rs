@@ -5,11 +5,12 @@ use axum::extract::{Form, State};
 use axum::http::HeaderMap;
 use axum::response::{IntoResponse as _, Redirect, Response};
 use serde::Deserialize;
-use store::{ItemLine, StudyRow, now_ms};
+use store::{ItemLine, StudyRow};
 
 use super::studies::{message, question_words};
-use super::{show, title};
-use crate::api::studies::{self as api, DAYS, SeatView, Study};
+use super::{in_worker, show, title};
+use crate::api::studies::{self as api, DAYS, SeatView};
+use crate::extract::Study;
 use crate::live::parse_study;
 use crate::problem::Problem;
 use crate::state::AppState;
@@ -128,7 +129,7 @@ pub async fn invite(
     headers: HeaderMap,
     Form(form): Form<InviteForm>,
 ) -> Result<Response, Problem> {
-    let until = now_ms() + i64::from(DAYS.0) * 24 * 60 * 60 * 1000;
+    let until = api::until(DAYS.0);
     let made = match form.seat {
         Some(seat) => vec![(seat, app.store.invite_again(study.id, seat, until).await?)],
         None => api::invitations(&app, &study, form.count.unwrap_or(1).min(1_000), until).await?,
@@ -150,7 +151,8 @@ async fn filled_in(
     let view = api::view(app, study.clone()).await?;
     let is = |state: &str| study.state == state;
     let results = if is("open") || is("closed") {
-        study_results::of(&app.store, study.id).await?
+        let labels = study_results::labels(&app.store, study.id).await?;
+        in_worker(move || study_results::results(&labels)).await?
     } else {
         study_results::Results::default()
     };

@@ -120,7 +120,7 @@ pub(crate) fn invalid(origin: &str, text: &str, error: &toml::de::Error) -> Conf
     }
 }
 
-fn merge(base: &mut Table, layer: &Table) {
+pub(super) fn merge(base: &mut Table, layer: &Table) {
     for (key, value) in layer {
         match (base.get_mut(key), value) {
             (Some(Value::Table(below)), Value::Table(above)) => merge(below, above),

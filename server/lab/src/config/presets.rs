@@ -1,9 +1,9 @@
 //! The presets of `assets/presets`, inside the program.
 
-use toml::Table;
+use toml::{Table, Value};
 
-use super::layers::parse_layer;
-use super::{ConfigError, unknown};
+use super::layers::{invalid, merge};
+use super::{ConfigError, RunConfig, unknown};
 
 /// `(name, task or "", text)` of every preset. A method's and `paper_table` hold for any task;
 /// `task` and `quick` have a text for each.
@@ -21,7 +21,8 @@ pub(crate) fn preset_names() -> Vec<&'static str> {
     known
 }
 
-/// A preset's own keys.
+/// A preset's own keys, on top of those of the preset that it is `like`: another task's of the
+/// same name.
 ///
 /// # Errors
 /// When there is none of that name for the task.
@@ -32,5 +33,48 @@ pub(super) fn preset(name: &str, task: &str) -> Result<Table, ConfigError> {
     let Some((_, _, text)) = found else {
         return Err(unknown("preset", name, preset_names().into_iter()));
     };
-    parse_layer(&format!("preset {name}"), text)
+    let origin = format!("preset {name}");
+    let own: Table = toml::from_str(text).map_err(|error| invalid(&origin, text, &error))?;
+    let (like, own): (Table, Table) = own.into_iter().partition(|(key, _)| key == "like");
+    let own = checked(&origin, own)?;
+    let Some(other) = like.get("like").and_then(Value::as_str) else {
+        return Ok(own);
+    };
+    let mut all = preset(name, other)?;
+    merge(&mut all, &own);
+    Ok(all)
+}
+
+/// Keys that settings have; a shipped preset has no line worth naming.
+fn checked(origin: &str, own: Table) -> Result<Table, ConfigError> {
+    match own.clone().try_into::<RunConfig>() {
+        Ok(_) => Ok(own),
+        Err(error) => Err(invalid(origin, "", &error)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_preset_that_is_like_another_changes_only_what_it_says() {
+        let (door, window) = ("door-open", "window-open");
+        let own = preset("quick", door).unwrap();
+        let mut like = preset("quick", window).unwrap();
+        assert_ne!(own, like);
+        like["feedback"]["queries_per_session"] = Value::Integer(120);
+        like["feedback"]["budget"] = Value::Integer(3000);
+        assert_eq!(own, like);
+    }
+
+    #[test]
+    fn a_key_that_no_setting_has_is_refused() {
+        let own = toml::from_str("[agent]\nhiden = [1]").unwrap();
+        let told = checked("preset x", own).unwrap_err().to_string();
+        assert!(
+            told.contains("hiden") && told.contains("`hidden`"),
+            "{told}"
+        );
+    }
 }

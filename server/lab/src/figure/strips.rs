@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::plot::{Anchor, Font, INK, PAPER, QUIET, Svg, series};
+use super::plot::{Anchor, Font, INK, PAPER, SMALL, Svg, series};
 use super::{FigureEntry, FigureError, Request, read_rows, shown_method};
 
 pub(super) const ENTRY: FigureEntry = FigureEntry {
@@ -71,12 +71,6 @@ const NAME: Font = Font {
     color: INK,
     is_strong: false,
 };
-const SMALL: Font = Font {
-    size: 11.5,
-    color: QUIET,
-    is_strong: false,
-};
-
 const NOTE: &str = "Below each picture: the step that led to it. Place 1 is the query that the method ranked first in its round.";
 
 fn make(request: &Request) -> Result<String, FigureError> {

@@ -1,7 +1,7 @@
 //! The temporal distance between the states of an episode, the stages that follow from it, and
 //! what was asked about the episode.
 
-use super::plot::{Anchor, Font, Frame, INK, Labels, PAPER, Panel, Pen, QUIET, Scale, Svg, shade};
+use super::plot::{Anchor, Font, Frame, INK, Labels, NAME, PAPER, Panel, Pen, Scale, Svg, shade};
 use super::{FigureEntry, FigureError, Request, read_rows, shown_method};
 use crate::temporal_map::TemporalMap;
 
@@ -29,11 +29,6 @@ const N_SHADES: u8 = 24;
 const SEGMENTATION: &str = "#d55e00";
 const ASKED: &str = "#0072b2";
 
-const NAME: Font = Font {
-    size: 12.0,
-    color: QUIET,
-    is_strong: false,
-};
 const INSIDE: Font = Font {
     size: 11.5,
     color: INK,

@@ -6,7 +6,7 @@ use domain::query::Question;
 use toml::de::DeTable;
 
 use super::known_pair::{Frame, KnownPair};
-use super::section::{Mistake, Mistakes, Section, Text, hint};
+use super::section::{Mistake, Mistakes, Placed, Section, Text, hint};
 use super::source::Source;
 
 /// What a study is, as its file says.
@@ -53,7 +53,10 @@ impl StudyFile {
         };
         let table = DeTable::parse(text.text).map_err(|error| {
             let line = text.line_of(error.span().map_or(0, |span| span.start));
-            let message = error.message().to_owned();
+            let message = format!(
+                "this is no TOML ({}); words stand in quotation marks",
+                error.message()
+            );
             refuse(vec![Mistake { line, message }])
         })?;
         let study = Self::read(Section::new(&text, table.get_ref(), 1), folder);
@@ -88,6 +91,18 @@ impl StudyFile {
         let source = section
             .table("source")
             .map(|table| Source::read(table, &tasks, folder));
+        if let Some(Source::Expert {
+            start_before,
+            n_episodes,
+        }) = source
+        {
+            check_segments(
+                &section,
+                &tasks,
+                &labels,
+                (start_before, n_episodes, segment_len),
+            );
+        }
         let n_methods = source.as_ref().map_or(0, |s| s.methods().len() as u32);
         if n_methods > 1 && !labels.value.is_multiple_of(n_methods) {
             let message = format!(
@@ -168,6 +183,28 @@ fn read_segment_len(section: &mut Section<'_>, tasks: &[&'static sim::tasks::Tas
         }
     }
     len.value
+}
+
+/// Every segment is shown once, so the experts' episodes must hold two for each pair.
+fn check_segments(
+    section: &Section<'_>,
+    tasks: &[&'static sim::tasks::Task],
+    labels: &Placed<u32>,
+    (start_before, n_episodes, segment_len): (u32, u32, u32),
+) {
+    for task in tasks {
+        let n_starts = ((task.spec)().episode_len + 1).saturating_sub(segment_len);
+        let there = n_episodes * start_before.min(n_starts);
+        if there < 2 * labels.value {
+            let (pairs, name) = (labels.value, task.name);
+            let message = format!(
+                "`labels_per_task` is {pairs}, which takes {} segments, but {n_episodes} episodes of {name} hold \
+                 {there} that start before step {start_before}",
+                2 * pairs
+            );
+            section.note(labels.line, message);
+        }
+    }
 }
 
 #[cfg(test)]
@@ -264,6 +301,11 @@ because = "Its window opens."
     fn what_no_study_can_be_is_refused() {
         for (from, to, said) in [
             (
+                "question = \"preference\"",
+                "question = preference",
+                "line 4: this is no TOML (",
+            ),
+            (
                 "labels_per_task = 20",
                 "labels_per_task = 0",
                 "line 5: `labels_per_task` must be between 1 and 10000",
@@ -307,6 +349,11 @@ because = "Its window opens."
                 "kind = \"expert\"",
                 "kind = \"queries\"",
                 "line 9: `sets` is missing",
+            ),
+            (
+                "kind = \"expert\"",
+                "kind = \"expert\"\nstart_before = 3\nepisodes = 13",
+                "line 5: `labels_per_task` is 20, which takes 40 segments, but 13 episodes of window-open hold 39",
             ),
             ("title = ", "title ", "line 2: "),
         ] {

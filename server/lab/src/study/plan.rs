@@ -18,8 +18,6 @@ use super::{
 
 /// Keys of [`Stream::Study`] from here on draw segments; smaller ones lay out labelers' turns.
 const FIRST_KEY: u64 = 1 << 32;
-/// Draws of a segment that has not been shown yet, before the same is taken again.
-const MOST_DRAWS: u32 = 1_000;
 
 /// Why a pair is in a study.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -94,6 +92,18 @@ pub enum PlanError {
         /// Its queries.
         found: usize,
         /// The method's share of the study's `labels_per_task`.
+        expected: usize,
+    },
+    /// Episodes of experts with fewer segments than the study shows.
+    #[error(
+        "the expert's episodes of {task} hold {found} segments that start early enough, but {expected} are shown; play more `episodes`"
+    )]
+    TooFewSegments {
+        /// Whose.
+        task: String,
+        /// Segments that there are.
+        found: usize,
+        /// Two for each pair.
         expected: usize,
     },
     /// A task without a scripted expert.
@@ -219,7 +229,7 @@ fn record_of(segment: &PackedSegment) -> SegmentRecord {
     }
 }
 
-/// Random pairs of different segments from episodes of the task's expert.
+/// Random pairs from episodes of the task's expert; no segment is shown twice.
 fn expert_pairs(
     study: &StudyFile,
     task: &Task,
@@ -240,29 +250,35 @@ fn expert_pairs(
         episodes.push(play(task, shot)?);
     }
     let len = study.segment_len;
-    let mut shown: Vec<Segment> = Vec::new();
-    let mut draw = || {
-        let mut draws = 0;
-        loop {
-            let episode = rng.below(episodes.len());
-            let n_steps = episodes[episode].task_rewards.len() as u32;
-            let n_starts = start_before.min((n_steps + 1).saturating_sub(len)).max(1);
-            let start = rng.below(n_starts as usize) as u32;
-            let record = window(&episodes[episode], episode as u32, start, len);
-            draws += 1;
-            if !shown.contains(&record.segment) || draws == MOST_DRAWS {
-                shown.push(record.segment);
-                return record;
-            }
-        }
+    let windows = |(number, episode): (usize, &Rollout)| {
+        let n_steps = episode.task_rewards.len() as u32;
+        let n_starts = start_before.min((n_steps + 1).saturating_sub(len));
+        (0..n_starts).map(move |start| (number, start))
     };
-    let pair = |_| PlannedPair {
+    let windows: Vec<(usize, u32)> = episodes.iter().enumerate().flat_map(windows).collect();
+    let n_wanted = 2 * study.labels_per_task as usize;
+    if windows.len() < n_wanted {
+        return Err(PlanError::TooFewSegments {
+            task: task.name.to_owned(),
+            found: windows.len(),
+            expected: n_wanted,
+        });
+    }
+    let order = rng.permutation(windows.len());
+    let records: Vec<SegmentRecord> = order[..n_wanted]
+        .iter()
+        .map(|&at| {
+            let (number, start) = windows[at];
+            window(&episodes[number], number as u32, start, len)
+        })
+        .collect();
+    let pairs = records.chunks_exact(2).map(|pair| PlannedPair {
         task: number,
         role: PairRole::Counted { method: None },
-        first: draw(),
-        second: draw(),
-    };
-    Ok((0..study.labels_per_task).map(pair).collect())
+        first: pair[0].clone(),
+        second: pair[1].clone(),
+    });
+    Ok(pairs.collect())
 }
 
 /// The whole episode of a shot.

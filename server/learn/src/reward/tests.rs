@@ -1,6 +1,6 @@
 use domain::answer::Which;
 use domain::environment::{EpisodeEnd, TaskReward};
-use domain::episode::EpisodeId;
+use domain::episode::{EpisodeId, Segment};
 
 use super::*;
 use crate::replay::{NewStep, ReplayShape};
@@ -92,12 +92,17 @@ pub(super) fn small() -> RewardConfig {
     }
 }
 
-/// In f64, over segments of different lengths and with equal preferences among them.
+/// In f64, over segments of different lengths and with equal preferences among them, at another
+/// temperature than 1.
 #[test]
 fn the_written_out_gradient_is_autograds() {
     let replay = replay(6);
     let labeled = labeled(&replay, 14, |i| 4 + i % 3);
-    let mut ours = RewardEnsemble::with_kind(&small(), (3, 2), 1, (Kind::Double, tch::Device::Cpu));
+    let config = RewardConfig {
+        temperature: 2.5,
+        ..small()
+    };
+    let mut ours = RewardEnsemble::with_kind(&config, (3, 2), 1, (Kind::Double, tch::Device::Cpu));
     let mut passes = vec![
         Pass::new((0..14).collect()),
         Pass::new((0..14).rev().collect()),
@@ -131,7 +136,7 @@ fn the_written_out_gradient_is_autograds() {
     let losses: Vec<Tensor> = labeled
         .iter()
         .map(|l| {
-            let logits = Tensor::stack(&[sum(l.query.first), sum(l.query.second)], 1);
+            let logits = Tensor::stack(&[sum(l.query.first), sum(l.query.second)], 1) / 2.5;
             let target = f64::from(l.preference.target());
             let target = Tensor::from_slice(&[1.0 - target, target]);
             -(logits.log_softmax(1, Kind::Double) * target).sum(Kind::Double)
@@ -144,6 +149,31 @@ fn the_written_out_gradient_is_autograds() {
     let theirs = flat.grad();
     let error = (&ours.parameters.gradient - &theirs).abs().max() / theirs.abs().max();
     assert!(error.double_value(&[]) < 1e-6, "off by {error:?}");
+}
+
+#[test]
+fn the_learning_rate_falls_in_a_straight_line() {
+    let replay = replay(2);
+    let labeled = labeled(&replay, 1, |_| 5);
+    let config = RewardConfig {
+        final_rate: 0.2,
+        max_epochs: 1,
+        ..small()
+    };
+    let moved = |done: f64| {
+        let mut ensemble = RewardEnsemble::new(&config, 3, 2, 1, Device::CPU);
+        let before = ensemble.parameters.values.copy();
+        ensemble.anneal(done);
+        ensemble.fit(&replay, &labeled);
+        (&ensemble.parameters.values - before)
+            .norm()
+            .double_value(&[])
+    };
+    let whole = moved(0.0);
+    for (done, share) in [(0.5, 0.6), (1.0, 0.2)] {
+        // Adam's first step is its rate times the gradient's sign
+        assert!((moved(done) / whole - share).abs() < 1e-3, "{done}");
+    }
 }
 
 #[test]

@@ -1,6 +1,5 @@
 //! The pairs of a study.
 
-use domain::answer::Which;
 use domain::episode::SegmentRecord;
 use domain::query::{OfferedQuery, QueryKey};
 use serde_json::json;
@@ -187,12 +186,3 @@ pub(super) fn collection(task: &str, budget: u32) -> NewRun {
 pub(super) const COPY_SEGMENTS: &str =
     "insert into query_segment (query_id, which, episode, start, len, poses, task_rewards, stages)
      select ?, which, episode, start, len, poses, task_rewards, stages from query_segment where query_id = ?";
-
-/// The side that a coin shows.
-pub(super) fn side(is_first: bool) -> Which {
-    if is_first {
-        Which::First
-    } else {
-        Which::Second
-    }
-}

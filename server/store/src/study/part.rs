@@ -68,7 +68,7 @@ impl Store {
 }
 
 /// Refuses questions of a study to all but the labeler whose they are, and to everybody while
-/// the study is not open. Runs outside of studies pass.
+/// the study is not open; refuses questions of other runs to those who were invited to a study.
 pub(crate) async fn check_open(
     t: &mut Transaction<'_>,
     run: RunId,
@@ -82,7 +82,11 @@ pub(crate) async fn check_open(
     .bind(run.0)
     .fetch_optional(&mut *t.connection)
     .await?;
-    let Some(row) = row else { return Ok(()) };
+    let Some(row) = row else {
+        let seated = sqlx::query("select 1 from study_seat where labeler_id = ?").bind(labeler.0);
+        let seated = seated.fetch_optional(&mut *t.connection).await?;
+        return seated.map_or(Ok(()), |_| Err(StoreError::NotYours));
+    };
     if row.try_get::<Option<i64>, _>(1)? != Some(labeler.0) {
         return Err(StoreError::NotYours);
     }

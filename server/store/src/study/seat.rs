@@ -7,7 +7,7 @@ use serde_json::json;
 use sqlx::Row as _;
 use sqlx::sqlite::SqliteRow;
 
-use super::item::{COPY_SEGMENTS, collection, side};
+use super::item::{COPY_SEGMENTS, collection};
 use super::{StudyId, note, state_of};
 use crate::error::{LinkTrouble, StoreError};
 use crate::labeler::{self, Labeler, LabelerId};
@@ -335,6 +335,8 @@ async fn lay_out(
     seat: i64,
     plan: &StudyPlan,
 ) -> Result<(), StoreError> {
+    let row = sqlx::query("select question from study where id = ?").bind(entrance.study.0);
+    let kind: String = row.fetch_one(&mut *t.connection).await?.try_get(0)?;
     let placed = read_items(t, entrance.study).await?;
     let (practice, rest): (Vec<_>, Vec<_>) = placed.iter().partition(|p| p.role == "practice");
     let items: Vec<study::Item> = rest
@@ -355,7 +357,11 @@ async fn lay_out(
             questions.push(Question {
                 placed,
                 role: "practice",
-                left_is: side(rng.chance(0.5)),
+                left_is: if rng.chance(0.5) {
+                    Which::First
+                } else {
+                    Which::Second
+                },
                 session: 0,
             });
         }
@@ -377,8 +383,8 @@ async fn lay_out(
             .bind(task)
             .execute(&mut *t.connection)
             .await?;
-        for (position, question) in questions.iter().enumerate() {
-            put(t, run, position as u32, question).await?;
+        for placed in (0..).zip(&questions) {
+            put(t, run, &kind, placed).await?;
         }
     }
     Ok(())
@@ -418,8 +424,8 @@ fn role(role: Role) -> &'static str {
 async fn put(
     t: &mut Transaction<'_>,
     run: run::RunId,
-    position: u32,
-    question: &Question<'_>,
+    kind: &str,
+    (position, question): (u32, &Question<'_>),
 ) -> Result<(), StoreError> {
     let row = sqlx::query(
         "insert into query (run_id, session, position, asks_same_stage, clip_state, first_clip, second_clip, created_at_ms)
@@ -445,11 +451,5 @@ async fn put(
         .bind(word(question.left_is))
         .execute(&mut *t.connection)
         .await?;
-    let row = sqlx::query(
-        "select study.question from study_item join study on study.id = study_item.study_id where study_item.id = ?",
-    )
-    .bind(question.placed.item)
-    .fetch_one(&mut *t.connection)
-    .await?;
-    ask(t, run, query, row.try_get(0)?).await
+    ask(t, run, query, kind).await
 }

@@ -12,7 +12,7 @@ use lab::temporal_map::{MapError, TemporalMap, is_learned_by};
 use tokio::sync::Semaphore;
 
 use crate::extract::Run;
-use crate::pages::experiment::in_worker;
+use crate::pages::in_worker;
 use crate::problem::Problem;
 use crate::state::AppState;
 

@@ -1,7 +1,7 @@
 //! Panels side by side under one key.
 
 use super::panel::Frame;
-use super::style::{INK, PAPER, QUIET, Series};
+use super::style::{INK, PAPER, SMALL, Series};
 use super::svg::{Anchor, Font, Svg};
 
 /// Margins of a panel: room for numbers and names.
@@ -12,11 +12,6 @@ const BOTTOM: f64 = 50.0;
 const KEY_HEIGHT: f64 = 34.0;
 const LINE_HEIGHT: f64 = 22.0;
 const NOTE_HEIGHT: f64 = 15.0;
-const NOTE: Font = Font {
-    size: 11.5,
-    color: QUIET,
-    is_strong: false,
-};
 
 /// A figure of equal panels in rows.
 #[derive(Debug, Clone)]
@@ -76,7 +71,7 @@ impl Sheet {
         }
         for (n, line) in self.note.iter().rev().enumerate() {
             let at = (LEFT - 8.0, self.height() - 10.0 - NOTE_HEIGHT * n as f64);
-            svg.text(at, line, Anchor::Start, NOTE);
+            svg.text(at, line, Anchor::Start, SMALL);
         }
         svg
     }
@@ -149,7 +144,7 @@ fn wrapped(text: &str, room: f64) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for word in text.split(' ') {
         match lines.last_mut() {
-            Some(line) if text_width(&format!("{line} {word}"), NOTE.size) <= room => {
+            Some(line) if text_width(&format!("{line} {word}"), SMALL.size) <= room => {
                 line.push(' ');
                 line.push_str(word);
             }
@@ -182,7 +177,7 @@ mod tests {
         assert!(
             lines
                 .iter()
-                .all(|line| text_width(line, NOTE.size) <= 150.0)
+                .all(|line| text_width(line, SMALL.size) <= 150.0)
         );
     }
 

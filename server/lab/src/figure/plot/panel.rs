@@ -1,7 +1,7 @@
 //! One pair of axes and what is drawn between them.
 
 use super::scale::Scale;
-use super::style::{INK, QUIET, RULE, Series};
+use super::style::{INK, NAME, QUIET, RULE, SMALL, Series};
 use super::svg::{Anchor, Font, Pen, Svg};
 
 /// The area between the axes.
@@ -44,17 +44,6 @@ const TITLE: Font = Font {
     color: INK,
     is_strong: true,
 };
-const NAME: Font = Font {
-    size: 12.0,
-    color: QUIET,
-    is_strong: false,
-};
-const TICK: Font = Font {
-    size: 11.5,
-    color: QUIET,
-    is_strong: false,
-};
-
 impl Panel {
     /// Where a point lies on the sheet.
     pub(crate) fn at(&self, (x, y): (f64, f64)) -> (f64, f64) {
@@ -80,7 +69,7 @@ impl Panel {
         for (value, label) in self.x.ticks(n_ticks) {
             let x = self.frame.x + self.x.place(value) * self.frame.width;
             svg.polyline(&[(x, bottom), (x, bottom + 4.0)], Pen::solid(QUIET, 1.0));
-            svg.text((x, bottom + 17.0), &label, Anchor::Middle, TICK);
+            svg.text((x, bottom + 17.0), &label, Anchor::Middle, SMALL);
         }
         self.draw_floor(svg);
     }
@@ -97,7 +86,7 @@ impl Panel {
         let bottom = self.frame.y + self.frame.height;
         for (value, name) in names {
             let x = self.frame.x + self.x.place(*value) * self.frame.width;
-            svg.text((x, bottom + 17.0), name, Anchor::Middle, TICK);
+            svg.text((x, bottom + 17.0), name, Anchor::Middle, SMALL);
         }
         self.draw_floor(svg);
     }
@@ -123,7 +112,7 @@ impl Panel {
         for (value, label) in self.y.ticks((height / 38.0) as usize) {
             let (_, y) = self.at((0.0, value));
             svg.polyline(&[(x, y), (x + width, y)], Pen::solid(RULE, 1.0));
-            svg.text((x - 8.0, y + 4.0), &label, Anchor::End, TICK);
+            svg.text((x - 8.0, y + 4.0), &label, Anchor::End, SMALL);
         }
     }
 
@@ -165,13 +154,13 @@ impl Panel {
     /// The n-th line of words in the upper left corner, inside.
     pub(crate) fn remark(&self, svg: &mut Svg, n: usize, text: &str) {
         let at = (self.frame.x + 8.0, self.frame.y + 28.0 + 15.0 * n as f64);
-        svg.text(at, text, Anchor::Start, TICK);
+        svg.text(at, text, Anchor::Start, SMALL);
     }
 
     /// Words below a name at the horizontal axis.
     pub(crate) fn below(&self, svg: &mut Svg, x: f64, text: &str) {
         let (x, floor) = self.at((x, 0.0));
-        svg.text((x, floor + 33.0), text, Anchor::Middle, TICK);
+        svg.text((x, floor + 33.0), text, Anchor::Middle, SMALL);
     }
 
     /// The area between the second and the third number of each row, over the first.

@@ -1,6 +1,6 @@
 //! Colours, dashes and markers.
 
-use super::svg::{Pen, Svg};
+use super::svg::{Font, Pen, Svg};
 
 /// Text.
 pub(crate) const INK: &str = "#1f2328";
@@ -10,6 +10,19 @@ pub(crate) const QUIET: &str = "#59636e";
 pub(crate) const RULE: &str = "#e4e7eb";
 /// What everything lies on.
 pub(crate) const PAPER: &str = "#ffffff";
+
+/// Names of axes and rows.
+pub(crate) const NAME: Font = Font {
+    size: 12.0,
+    color: QUIET,
+    is_strong: false,
+};
+/// Numbers along axes, remarks and notes.
+pub(crate) const SMALL: Font = Font {
+    size: 11.5,
+    color: QUIET,
+    is_strong: false,
+};
 
 /// The shape that marks a series' points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
