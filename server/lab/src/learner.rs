@@ -203,11 +203,10 @@ impl Learner {
         }
     }
 
-    /// Lets the agent's and the reward's learning rates fall with the part of the run that is
-    /// behind, [0, 1].
+    /// Leads the agent's learning rates and entropy to their last ones with the part of the run
+    /// that is behind, [0, 1].
     pub(crate) fn anneal(&mut self, done: f64) {
         self.agent.anneal(done);
-        self.reward.anneal(done);
     }
 
     /// Actions sampled from the policy, `[n × A]`.

@@ -39,10 +39,6 @@ pub struct RewardConfig {
     ///
     /// Differs from the paper: its table says 1e-4, the released code uses 3e-4.
     pub learning_rate: f64,
-    /// Share of the rate that is left at the end of a run, (0, 1]; it falls evenly. 1 keeps it.
-    ///
-    /// The more answers there are, the less should a session of few more move what all say.
-    pub final_rate: f64,
     /// Pairs in a minibatch.
     pub batch: usize,
     /// Passes over all preferences after a session, at most.
@@ -79,7 +75,6 @@ impl Default for RewardConfig {
             members: 3,
             hidden: vec![256; 3],
             learning_rate: 3e-4,
-            final_rate: 1.0,
             batch: 128,
             max_epochs: 10,
             stop_accuracy: 0.97,
@@ -167,8 +162,6 @@ pub struct RewardEnsemble {
     net: Net,
     gradient: Net,
     scale: Scale,
-    /// Share of the learning rate that is left.
-    rate: f64,
     n_epochs: u64,
 }
 
@@ -280,15 +273,8 @@ impl RewardEnsemble {
             parameters,
             net,
             scale: Scale::NONE,
-            rate: 1.0,
             n_epochs: 0,
         }
-    }
-
-    /// Lets the learning rate fall to [`RewardConfig::final_rate`]; `done` is the part of the run
-    /// that is behind, [0, 1]. It follows from the step, so no checkpoint holds it.
-    pub fn anneal(&mut self, done: f64) {
-        self.rate = 1.0 + done.clamp(0.0, 1.0) * (self.config.final_rate - 1.0);
     }
 
     /// Goes on from the present weights, over all preferences so far, until the members are
@@ -328,7 +314,7 @@ impl RewardEnsemble {
         for start in (0..labeled.len()).step_by(self.config.batch) {
             let end = labeled.len().min(start + self.config.batch);
             self.gradient(replay, labeled, &mut passes, start..end);
-            self.parameters.step_at(self.rate * rate);
+            self.parameters.step_at(rate);
         }
         passes
     }
@@ -368,7 +354,7 @@ impl RewardEnsemble {
     fn step(&mut self, replay: &Replay, examples: &[Example]) -> Vec<f64> {
         self.parameters.zero_gradient();
         let logits = self.add_gradient(replay, examples);
-        self.parameters.step_at(self.rate);
+        self.parameters.step();
         logits
     }
 

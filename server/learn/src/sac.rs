@@ -54,6 +54,12 @@ pub struct SacConfig {
     /// Share of the learning rates that is left at the run's last step, (0, 1]: they fall in
     /// a straight line. 1, the released code's, keeps them.
     pub final_rate: f64,
+    /// Entropy that the policy shall have at the run's last step, nats for each number of an
+    /// action; it is led there from −1 in a straight line. −1, the released code's, stays.
+    ///
+    /// A policy that always has some chance learns to rely on it, and its mean action, by which
+    /// it is judged, can stand still where a chance action would have gone on.
+    pub final_entropy: f64,
     /// Whether the critics' hidden layers are normalised; the released code's are not. With it,
     /// higher learning rates hold.
     pub layer_norm: bool,
@@ -75,6 +81,7 @@ impl Default for SacConfig {
             target_every: 2,
             actor_ema: 0.0,
             final_rate: 1.0,
+            final_entropy: FIRST_ENTROPY,
             layer_norm: false,
             precision: Precision::F32,
         }
@@ -148,7 +155,8 @@ pub struct Sac {
     target: Net,
     average: Option<Average>,
     temperature: Temperature,
-    rate: f64,
+    /// Part of the run that is behind, [0, 1].
+    done: f64,
     n_updates: u64,
     n_critic_resets: u64,
 }
@@ -258,7 +266,7 @@ impl Sac {
             critic,
             target: Net::over(&critic_shape, &target_values, 0),
             average,
-            rate: 1.0,
+            done: 0.0,
             critic_shape,
             target_values,
             temperature: Temperature {
@@ -323,17 +331,16 @@ impl Sac {
 
         let target = self.bellman_target(&rows, &next_noise, alpha);
         let (critic_loss, q_mean) = self.critic_gradient(&rows, &target);
-        self.critic.parameters.step_at(self.rate);
+        self.critic.parameters.step_at(self.rate());
         let (actor_loss, entropy) = self.actor_gradient(&rows, &noise, alpha);
-        self.actor.parameters.step_at(self.rate);
+        self.actor.parameters.step_at(self.rate());
         if let Some(average) = &mut self.average {
             let weight = self.config.actor_ema;
             kernel::lerp(&mut average.values, &self.actor.parameters.values, weight);
         }
-        let target_entropy = -(self.action_size as f64);
         self.temperature.step(
-            alpha * (entropy - target_entropy),
-            self.rate * self.config.alpha_learning_rate,
+            alpha * (entropy - self.wanted_entropy()),
+            self.rate() * self.config.alpha_learning_rate,
         );
         if self
             .n_updates
@@ -362,10 +369,22 @@ impl Sac {
         self.critic.parameters.reset_moments();
     }
 
-    /// Lets the learning rates fall to [`SacConfig::final_rate`]; `done` is the part of the run
-    /// that is behind, [0, 1]. It follows from the step, so no checkpoint holds it.
+    /// Leads the learning rates to [`SacConfig::final_rate`] and the policy's entropy to
+    /// [`SacConfig::final_entropy`]; `done` is the part of the run that is behind, [0, 1]. It
+    /// follows from the step, so no checkpoint holds it.
     pub fn anneal(&mut self, done: f64) {
-        self.rate = 1.0 + done.clamp(0.0, 1.0) * (self.config.final_rate - 1.0);
+        self.done = done.clamp(0.0, 1.0);
+    }
+
+    /// Share of the learning rates that is left.
+    fn rate(&self) -> f64 {
+        1.0 + self.done * (self.config.final_rate - 1.0)
+    }
+
+    /// Entropy towards which α leads the policy, nats.
+    fn wanted_entropy(&self) -> f64 {
+        let each = FIRST_ENTROPY + self.done * (self.config.final_entropy - FIRST_ENTROPY);
+        each * self.action_size as f64
     }
 
     /// Updates so far.
@@ -513,6 +532,9 @@ const ACTOR_SECTION: &str = "sac.actor";
 /// Where the averaged actor lies, if there is one.
 const AVERAGE_SECTION: &str = "sac.actor.average";
 /// Keys of initial weights: the actor, then the critics of each reset.
+/// Entropy that SAC wants of a policy, nats for each number of an action.
+const FIRST_ENTROPY: f64 = -1.0;
+
 const ACTOR: u64 = 0;
 const FIRST_CRITIC: u64 = 1_000;
 

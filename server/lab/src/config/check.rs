@@ -108,14 +108,12 @@ impl RunConfig {
         if !(0.0..=1.0).contains(&agent.actor_ema) {
             return out("agent.actor_ema", &agent.actor_ema, "from 0 to 1");
         }
-        let final_rates = [
-            ("agent.final_rate", agent.final_rate),
-            ("reward.final_rate", self.reward.final_rate),
-        ];
-        for (key, rate) in final_rates {
-            if !(rate > 0.0 && rate <= 1.0) {
-                return out(key, &rate, "above 0, at most 1");
-            }
+        if !(agent.final_rate > 0.0 && agent.final_rate <= 1.0) {
+            let must_be = "above 0, at most 1";
+            return out("agent.final_rate", &agent.final_rate, must_be);
+        }
+        if !agent.final_entropy.is_finite() || agent.final_entropy > 0.0 {
+            return out("agent.final_entropy", &agent.final_entropy, "at most 0");
         }
         Ok(())
     }

@@ -152,31 +152,6 @@ fn the_written_out_gradient_is_autograds() {
 }
 
 #[test]
-fn the_learning_rate_falls_in_a_straight_line() {
-    let replay = replay(2);
-    let labeled = labeled(&replay, 1, |_| 5);
-    let config = RewardConfig {
-        final_rate: 0.2,
-        max_epochs: 1,
-        ..small()
-    };
-    let moved = |done: f64| {
-        let mut ensemble = RewardEnsemble::new(&config, 3, 2, 1, Device::CPU);
-        let before = ensemble.parameters.values.copy();
-        ensemble.anneal(done);
-        ensemble.fit(&replay, &labeled);
-        (&ensemble.parameters.values - before)
-            .norm()
-            .double_value(&[])
-    };
-    let whole = moved(0.0);
-    for (done, share) in [(0.5, 0.6), (1.0, 0.2)] {
-        // Adam's first step is its rate times the gradient's sign
-        assert!((moved(done) / whole - share).abs() < 1e-3, "{done}");
-    }
-}
-
-#[test]
 fn the_learned_reward_follows_the_preferences() {
     let mut replay = replay(40);
     let labeled = labeled(&replay, 400, |_| 5);
