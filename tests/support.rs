@@ -106,10 +106,7 @@ impl TestApp {
     /// A program with a teacher token.
     pub(crate) fn program(&self) -> Client {
         let token = self.server.teacher_token(&self.run);
-        Client {
-            header: Some(("authorization", format!("Bearer {token}"))),
-            ..self.stranger()
-        }
+        self.stranger().with_token(&token)
     }
 }
 
@@ -128,6 +125,14 @@ impl Client {
         Self {
             run: run.to_owned(),
             ..self.clone()
+        }
+    }
+
+    /// Who brings this token.
+    pub(crate) fn with_token(self, token: &str) -> Self {
+        Self {
+            header: Some(("authorization", format!("Bearer {token}"))),
+            ..self
         }
     }
 

@@ -67,19 +67,44 @@ impl Open {
     fn of(request: &Value) -> Self {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let server = ServerProcess::start(folder.path());
-        let made = Client::stranger_of(&server).send("POST", "/api/v1/studies", Some(request));
+        let researcher = Client::stranger_of(&server);
+        Self::made(server, researcher, folder, request)
+    }
+
+    /// The small study at a server that wants a token, which its researcher has.
+    pub(crate) fn guarded(question: &str) -> Self {
+        let token = "not-to-be-guessed-0";
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let server = ServerProcess::start_guarded(folder.path(), token);
+        let researcher = Client::stranger_of(&server).with_token(token);
+        let request = json!({"text": small(question)});
+        Self::made(server, researcher, folder, &request)
+    }
+
+    fn made(
+        server: ServerProcess,
+        researcher: Client,
+        folder: tempfile::TempDir,
+        request: &Value,
+    ) -> Self {
+        let made = researcher.send("POST", "/api/v1/studies", Some(request));
         let path = format!("/api/v1/studies/{}", made.expect(201).json()["id"]);
-        Self::opened(server, path, folder)
+        Self::opened(server, researcher, path, folder)
     }
 
     /// The first study of a data folder.
     pub(crate) fn over(folder: tempfile::TempDir) -> Self {
         let server = ServerProcess::start(folder.path());
-        Self::opened(server, "/api/v1/studies/1".to_owned(), folder)
+        let researcher = Client::stranger_of(&server);
+        Self::opened(server, researcher, "/api/v1/studies/1".to_owned(), folder)
     }
 
-    fn opened(server: ServerProcess, path: String, folder: tempfile::TempDir) -> Self {
-        let researcher = Client::stranger_of(&server);
+    fn opened(
+        server: ServerProcess,
+        researcher: Client,
+        path: String,
+        folder: tempfile::TempDir,
+    ) -> Self {
         wait_for("the study to be ready", || {
             let study = researcher.send("GET", &path, None).expect(200).json();
             assert_ne!(study["state"], "failed", "{study}");
@@ -245,4 +270,38 @@ fn nobody_else_reaches_a_labelers_questions() {
     let page = format!("/runs/{}/label", one.run());
     other.send("GET", &page, None).expect(404);
     one.send("GET", &page, None).expect(200);
+}
+
+#[test]
+fn at_a_server_with_a_token_a_labeler_needs_nothing_but_their_link() {
+    let study = Open::guarded("preference");
+    let stranger = Client::stranger_of(&study.server);
+    let get = |who: &Client, path: &str, status| who.send("GET", path, None).expect(status);
+    let code = study.code();
+    get(&stranger, &format!("/join?code={code}"), 200);
+    get(&stranger, "/seat", 401);
+    let agreed = json!({"code": code, "agrees": true});
+    let joined = stranger.send("POST", "/api/v1/join", Some(&agreed));
+    let labeler = stranger.with_cookie_of(&joined.expect(201));
+    get(&labeler, "/seat", 200);
+    let seat = get(&labeler, "/api/v1/seat", 200).json();
+    let labeler = labeler.on_run(&seat["parts"][0]["run_id"].to_string());
+    let run = labeler.run();
+    get(&labeler, &format!("/runs/{run}/label"), 200);
+    let first = &labeler.leases(1)[0];
+    let clip = first["left"]["clip"].as_str().expect("where the clip is");
+    assert!(get(&labeler, clip, 200).len() > 1_000);
+    get(&stranger, clip, 401);
+    assert_eq!(answer_all(&labeler, "left").len(), 9);
+    for researchers in [
+        "/".to_owned(),
+        "/studies/1".to_owned(),
+        format!("/runs/{run}"),
+        format!("/api/v1/runs/{run}/labels"),
+        study.path.clone(),
+        format!("{}/labels", study.path),
+    ] {
+        get(&labeler, &researchers, 401);
+    }
+    assert_eq!(study.labels().len(), 9);
 }

@@ -16,18 +16,26 @@ pub(crate) struct ServerProcess {
     /// `127.0.0.1:port`
     pub(crate) address: String,
     data: PathBuf,
+    /// What others must bring.
+    token: Option<&'static str>,
 }
 
 impl ServerProcess {
     /// On a free port.
     pub(crate) fn start(data: &Path) -> Self {
-        Self::start_at(data, "127.0.0.1:0")
+        Self::start_at(data, "127.0.0.1:0", None)
     }
 
-    fn start_at(data: &Path, address: &str) -> Self {
+    /// The same, for those alone who bring a token.
+    pub(crate) fn start_guarded(data: &Path, token: &'static str) -> Self {
+        Self::start_at(data, "127.0.0.1:0", Some(token))
+    }
+
+    fn start_at(data: &Path, address: &str, token: Option<&'static str>) -> Self {
         let mut child = stair()
             .args(["serve", "--bind", address, "--data"])
             .arg(data)
+            .args(token.iter().flat_map(|token| ["--token", token]))
             .stdout(Stdio::piped())
             .spawn()
             .expect("stair serve");
@@ -50,6 +58,7 @@ impl ServerProcess {
             child,
             address,
             data: data.to_owned(),
+            token,
         };
         wait_for("the server to be ready", || {
             ask(&server.address, "GET", "/readyz", None, None).is_some()
@@ -61,7 +70,7 @@ impl ServerProcess {
     pub(crate) fn kill_and_restart(&mut self) {
         self.child.kill().expect("SIGKILL");
         self.child.wait().expect("an ended process");
-        *self = Self::start_at(&self.data, &self.address);
+        *self = Self::start_at(&self.data, &self.address, self.token);
     }
 
     /// SIGTERM, and how the process ended.
@@ -75,7 +84,7 @@ impl ServerProcess {
 
     /// A new process on the same port and folder after the old one ended.
     pub(crate) fn restart(&mut self) {
-        *self = Self::start_at(&self.data, &self.address);
+        *self = Self::start_at(&self.data, &self.address, self.token);
     }
 
     /// The JSON body of a request that must succeed.
