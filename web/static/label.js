@@ -1,9 +1,10 @@
 // The labeler's page: one key stores the answer and shows the next pair.
-import { Problem, request, timeOfDay } from './api.js';
-import { drawCurve, foldEvents } from './chart.js';
+import { Problem } from './api.js';
 import { Outbox } from './outbox.js';
 import './pair.js';
 import { preparePair, ReadyPairs, releasePair } from './ready.js';
+import { WaitingCard } from './waiting.js';
+import { announce, notice, tellSaved, tellUnsaved, tellWaitingAnswers } from './words.js';
 
 const KEYS = {
   preference: { 1: 'left', ArrowLeft: 'left', 2: 'right', ArrowRight: 'right', 3: 'equal', ArrowDown: 'equal' },
@@ -25,6 +26,7 @@ const reasons = $('reasons');
 /** A study: fixed pairs, practice with a word on each answer, and a task after this one. */
 const isStudy = 'study' in page.dataset;
 const feedback = $('feedback');
+const waiting = new WaitingCard(run, !isStudy);
 
 /** What is on: `{lease, left, right}`, and whether it is an answered one that was gone back to. */
 let current = null;
@@ -228,90 +230,16 @@ function tellProgress({ state, progress }) {
   if (page.dataset.stage === 'waiting' || !current) tellWaiting(state);
 }
 
+function tellWaiting(state) {
+  waiting.tell(state, ready.isPreparing);
+}
+
 /** The next task of a study, once every answer is with the server. */
 async function leaveWhenSent() {
   if (await outbox.isEmpty()) location.assign('/seat');
 }
 
-const HEADINGS = {
-  open: 'The next pair is on its way',
-  saving: 'Saving your answer',
-  offline: 'No connection to the server',
-  drawing: 'Drawing the next clips',
-  waiting: 'The agent is practising',
-  held: 'Others are on the remaining pairs',
-  done: 'All done — thank you',
-  paused: 'Paused for now',
-  failed: 'This run cannot go on',
-};
-
-function tellWaiting(state) {
-  const card = $('waiting');
-  if (card.dataset.kind !== state.kind) curveAt = 0;
-  card.dataset.kind = state.kind;
-  // Questions that are open for the server, none of them left here: its word on the last answer is due.
-  const isSaving = state.kind === 'open' && !ready.isPreparing;
-  setText('waiting-title', HEADINGS[isSaving ? 'saving' : state.kind] ?? state.kind);
-  const until = state.until ? ` Until ${timeOfDay(state.until).slice(0, 5)}.` : '';
-  setText('waiting-text', state.kind === 'open' ? '' : `${state.message ?? ''}${until}`);
-  const progress = state.phase?.progress;
-  const hasProgress = typeof progress === 'number' && state.kind === 'waiting';
-  $('waiting-bar').hidden = !hasProgress;
-  if (hasProgress) $('waiting-bar').value = progress;
-  $('to-run').hidden = !['done', 'failed', 'paused'].includes(state.kind);
-  tellCurve(state.kind);
-}
-
-let curveAt = 0;
-
-/** Success so far, at most every two seconds, while there is nothing else to look at. */
-async function tellCurve(kind) {
-  if (isStudy || !['waiting', 'done'].includes(kind) || Date.now() - curveAt < 2_000) return;
-  curveAt = Date.now();
-  const events = await request('GET', `/api/v1/runs/${run}/metrics`).catch(() => null);
-  const points = events ? foldEvents(events).success : [];
-  $('waiting-curve').hidden = points.length < 2;
-  if (points.length >= 2) drawCurve($('waiting-svg'), { series: [{ name: 'success', points }], range: [0, 1], format: percent });
-}
-
-const percent = (value) => `${Math.round(value * 100)} %`;
-
-// --- small words -------------------------------------------------------------------------------
-
-function setText(id, text) {
-  if ($(id).textContent !== text) $(id).textContent = text;
-}
-
-function tellUnsaved() {
-  $('saved').dataset.state = 'sending';
-}
-
-function tellSaved(storedAt) {
-  $('saved').dataset.state = 'saved';
-  setText('saved', `saved ${timeOfDay(storedAt)}`);
-}
-
-function tellWaitingAnswers({ count, isOffline }) {
-  if (count === 0) return;
-  $('saved').dataset.state = 'unsent';
-  const what = count === 1 ? '1 answer is kept here' : `${count} answers are kept here`;
-  setText('saved', isOffline ? `no connection: ${what} and will be sent when it is back` : `the server is busy: ${what} and will be sent soon`);
-}
-
-let noticeTimer = 0;
-
-function notice(text, isBad = false) {
-  const box = $('notice');
-  box.textContent = text;
-  box.dataset.tone = isBad ? 'bad' : 'plain';
-  box.hidden = false;
-  clearTimeout(noticeTimer);
-  noticeTimer = setTimeout(() => { box.hidden = true; }, 12_000);
-}
-
-function announce(text) {
-  $('announcer').textContent = text;
-}
+// --- guidance ----------------------------------------------------------------------------------
 
 /** Guidance comes before the first pair, and again when its words have changed. */
 function greet() {
