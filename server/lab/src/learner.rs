@@ -156,6 +156,7 @@ impl Learner {
             labeled,
             unlabeled,
         };
+        self.reward.measure_inputs(replay);
         self.fitting.fit(&mut self.reward, &lesson)
     }
 

@@ -16,11 +16,13 @@ use crate::replay::Replay;
 
 mod chunk;
 mod denoise;
+mod inputs;
 mod learner;
 mod meta;
 mod semi;
 
 use chunk::{Chunk, longest};
+use inputs::{Inputs, Moments};
 
 pub use denoise::{Denoising, DenoisingConfig};
 pub use learner::{Lesson, RewardLearner, Supervised};
@@ -65,6 +67,12 @@ pub struct RewardConfig {
     /// each fit moves both, and with them every value that the critics know.
     /// Source: Christiano et al. (2017), 2.2.3, who normalise the rewards of their ensemble.
     pub normalized_std: f64,
+    /// Whether each number of a state is brought to mean 0 and standard deviation 1 over the
+    /// replay, anew before each fit, and cut off at 5; the released code takes them as they are.
+    ///
+    /// What decides a preference late in a task is often a centimetre, and networks that see
+    /// metres are slow to tell it.
+    pub normalized_inputs: bool,
     /// `f32`, or `bf16` for faster and coarser fitting and relabelling.
     pub precision: Precision,
 }
@@ -81,6 +89,7 @@ impl Default for RewardConfig {
             label_margin: 0.0,
             temperature: 1.0,
             normalized_std: 0.0,
+            normalized_inputs: false,
             precision: Precision::F32,
         }
     }
@@ -161,6 +170,7 @@ pub struct RewardEnsemble {
     parameters: Parameters,
     net: Net,
     gradient: Net,
+    inputs: Option<Inputs>,
     scale: Scale,
     n_epochs: u64,
 }
@@ -272,8 +282,19 @@ impl RewardEnsemble {
             gradient: Net::over(&shape, &parameters.gradient, 0),
             parameters,
             net,
+            inputs: None,
             scale: Scale::NONE,
             n_epochs: 0,
+        }
+    }
+
+    /// Takes the level and spread of what is in the replay for those of inputs, where
+    /// [`RewardConfig::normalized_inputs`] asks for it; what is predicted changes with them, so a
+    /// fit comes next.
+    pub fn measure_inputs(&mut self, replay: &Replay) {
+        if self.config.normalized_inputs {
+            let moments = Moments::of(replay);
+            self.inputs = moments.map(|moments| Inputs::new(moments, self.options));
         }
     }
 
@@ -509,6 +530,7 @@ impl RewardEnsemble {
         self.parameters.save("reward", archive);
         archive.put_json("reward.epochs", &self.n_epochs);
         archive.put_f64("reward.scale", &[self.scale.offset, self.scale.factor]);
+        archive.put_json("reward.inputs", &self.inputs.as_ref().map(|i| &i.moments));
     }
 
     /// What [`RewardEnsemble::save`] wrote, from any device.
@@ -520,6 +542,8 @@ impl RewardEnsemble {
         self.n_epochs = archive.json("reward.epochs")?;
         let [offset, factor] = archive.f64("reward.scale")?;
         self.scale = Scale { offset, factor };
+        let moments: Option<Moments> = archive.json("reward.inputs")?;
+        self.inputs = moments.map(|moments| Inputs::new(moments, self.options));
         Ok(())
     }
 
@@ -544,7 +568,11 @@ impl RewardEnsemble {
     }
 
     fn input(&self, rows: &[f32]) -> Tensor {
-        matrix(rows, self.columns, self.options)
+        let rows = matrix(rows, self.columns, self.options);
+        match &self.inputs {
+            Some(inputs) => inputs.apply(&rows),
+            None => rows,
+        }
     }
 }
 
