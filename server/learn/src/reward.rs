@@ -3,115 +3,33 @@
 use domain::answer::Preference;
 use domain::query::Query;
 use domain::random::{Rng, Stream};
-use serde::{Deserialize, Serialize};
 use tch::{Kind, Tensor};
 
 use crate::checkpoint::Archive;
 use crate::device::Device;
 use crate::error::LearnError;
 use crate::init;
-use crate::net::{Net, NetShape, Parameters, matrix, to_vec};
-use crate::precision::Precision;
+use crate::net::{Net, Parameters, matrix, to_vec};
 use crate::replay::Replay;
 
 mod chunk;
+mod config;
 mod denoise;
+mod fit;
 mod inputs;
 mod learner;
 mod meta;
 mod semi;
 
 use chunk::{Chunk, longest};
+use fit::{Example, Pass, summary};
 use inputs::{Inputs, Moments};
 
+pub use config::RewardConfig;
 pub use denoise::{Denoising, DenoisingConfig};
 pub use learner::{Lesson, RewardLearner, Supervised};
 pub use meta::SteeringConfig;
 pub use semi::{SemiSupervised, SemiSupervisedConfig};
-
-/// Settings of the ensemble. Defaults: the released settings for MetaWorld.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct RewardConfig {
-    /// Members, `M`.
-    pub members: usize,
-    /// Hidden layers of each.
-    pub hidden: Vec<i64>,
-    /// Adam's rate.
-    ///
-    /// Differs from the paper: its table says 1e-4, the released code uses 3e-4.
-    pub learning_rate: f64,
-    /// Pairs in a minibatch.
-    pub batch: usize,
-    /// Passes over all preferences after a session, at most.
-    pub max_epochs: u32,
-    /// Fitting stops after a pass in which this share of the preferences was right, mean over
-    /// members.
-    pub stop_accuracy: f32,
-    /// How far a preference is trained from certainty, in [0, ½): towards P = 1 − margin instead
-    /// of 1. Without it, few answers that are passed over often saturate the tanh, and later
-    /// answers can no longer move the reward there. B-Pref's `label_margin`.
-    pub label_margin: f64,
-    /// Divides the difference of two segments' sums in P = σ(Δ / temperature), above 0.
-    ///
-    /// At 1 a preference between segments of 50 steps is certain once they differ by a tenth a
-    /// step, and nothing drives learned rewards further apart. Higher ones do spread them, but
-    /// let them drift together to one end of (−1, 1): with 10 window-open was not learned.
-    ///
-    /// Differs from the paper: its Eq. 1 has none, which is 1.
-    pub temperature: f64,
-    /// Standard deviation that learned rewards have over the whole replay, their mean being 0;
-    /// relabelling sees to it. 0 leaves them as the members say, as the released code does.
-    ///
-    /// Preferences say nothing about how high all rewards lie and little about how far apart:
-    /// each fit moves both, and with them every value that the critics know.
-    /// Source: Christiano et al. (2017), 2.2.3, who normalise the rewards of their ensemble.
-    pub normalized_std: f64,
-    /// Whether each number of a state is brought to mean 0 and standard deviation 1 over the
-    /// replay, anew before each fit, and cut off at 5; the released code takes them as they are.
-    ///
-    /// What decides a preference late in a task is often a centimetre, and networks that see
-    /// metres are slow to tell it.
-    pub normalized_inputs: bool,
-    /// `f32`, or `bf16` for faster and coarser fitting and relabelling.
-    pub precision: Precision,
-}
-
-impl Default for RewardConfig {
-    fn default() -> Self {
-        Self {
-            members: 3,
-            hidden: vec![256; 3],
-            learning_rate: 3e-4,
-            batch: 128,
-            max_epochs: 10,
-            stop_accuracy: 0.97,
-            label_margin: 0.0,
-            temperature: 1.0,
-            normalized_std: 0.0,
-            normalized_inputs: false,
-            precision: Precision::F32,
-        }
-    }
-}
-
-impl RewardConfig {
-    /// All members, for states and actions of so many numbers.
-    fn shape(&self, sizes: (usize, usize)) -> NetShape {
-        let columns = (sizes.0 + sizes.1) as i64;
-        NetShape {
-            slope: SLOPE,
-            precision: self.precision,
-            ..NetShape::new(self.members as i64, columns, &self.hidden, 1)
-        }
-    }
-
-    /// Bytes that an ensemble and its fitting hold, whatever the number of preferences.
-    pub fn bytes(&self, observation_size: usize, action_size: usize) -> u64 {
-        let shape = self.shape((observation_size, action_size));
-        shape.trained_bytes() + shape.pass_bytes(CHUNK_ROWS)
-    }
-}
 
 /// A query with what was preferred.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -197,59 +115,6 @@ impl Scale {
     }
 }
 
-/// One member's order of the preferences in an epoch, and how it did.
-struct Pass {
-    order: Vec<usize>,
-    n_seen: usize,
-    loss: f64,
-    n_right: u32,
-    n_judged: u32,
-}
-
-impl Pass {
-    fn new(order: Vec<usize>) -> Self {
-        Self {
-            order,
-            n_seen: 0,
-            loss: 0.0,
-            n_right: 0,
-            n_judged: 0,
-        }
-    }
-
-    /// Equal preferences count for the loss alone.
-    fn record(&mut self, example: &Example, logit: f64) {
-        self.n_seen += 1;
-        self.loss += softplus(logit) - example.target * logit;
-        let side = example.target - 0.5;
-        if side.abs() > f64::EPSILON {
-            self.n_judged += 1;
-            self.n_right += u32::from((logit > 0.0) == (side > 0.0));
-        }
-    }
-}
-
-/// What the members' passes say together.
-fn summary(passes: &[Pass], n_epochs: u32) -> RewardFit {
-    let mean =
-        |value: &dyn Fn(&Pass) -> f64| passes.iter().map(value).sum::<f64>() / passes.len() as f64;
-    RewardFit {
-        n_epochs,
-        loss: mean(&|p| p.loss / p.n_seen.max(1) as f64) as f32,
-        accuracy: mean(&|p| f64::from(p.n_right) / f64::from(p.n_judged.max(1))) as f32,
-    }
-}
-
-/// A pair as a member's loss sees it.
-#[derive(Debug, Clone, Copy)]
-struct Example {
-    query: Query,
-    /// Of P(second ≻ first).
-    target: f64,
-    /// Of its cross-entropy.
-    weight: f64,
-}
-
 impl RewardEnsemble {
     /// Fresh weights that follow from `seed`.
     pub fn new(
@@ -296,131 +161,6 @@ impl RewardEnsemble {
             let moments = Moments::of(replay);
             self.inputs = moments.map(|moments| Inputs::new(moments, self.options));
         }
-    }
-
-    /// Goes on from the present weights, over all preferences so far, until the members are
-    /// right often enough or the passes are used up.
-    ///
-    /// Each member sees the preferences in its own order. The loss is the cross-entropy of
-    /// P(second ≻ first) = σ((Σ r(second) − Σ r(first)) / temperature) to 0, 1 (less the label margin), or ½ for
-    /// equal, mean over a minibatch, summed over members.
-    ///
-    /// Source: BPref's `train_soft_reward` without smoothing. Differs from the code: equal
-    /// preferences need no global switch.
-    ///
-    /// # Panics
-    /// When a segment is not in the replay.
-    pub fn fit(&mut self, replay: &Replay, labeled: &[Labeled]) -> RewardFit {
-        let mut fit = RewardFit::default();
-        if labeled.is_empty() {
-            return fit;
-        }
-        for n_epochs in 1..=self.config.max_epochs {
-            fit = summary(&self.epoch(replay, labeled, 1.0), n_epochs);
-            if fit.accuracy > self.config.stop_accuracy {
-                break;
-            }
-        }
-        fit
-    }
-
-    /// One pass of every member over all preferences, at a share of the learning rate.
-    fn epoch(&mut self, replay: &Replay, labeled: &[Labeled], rate: f64) -> Vec<Pass> {
-        let mut rng = Rng::new(self.seed, Stream::RewardFit, self.n_epochs);
-        self.n_epochs += 1;
-        let members = 0..self.config.members;
-        let mut passes: Vec<Pass> = members
-            .map(|_| Pass::new(rng.permutation(labeled.len())))
-            .collect();
-        for start in (0..labeled.len()).step_by(self.config.batch) {
-            let end = labeled.len().min(start + self.config.batch);
-            self.gradient(replay, labeled, &mut passes, start..end);
-            self.parameters.step_at(rate);
-        }
-        passes
-    }
-
-    /// Fills the gradient with that of a range of each member's order.
-    fn gradient(
-        &mut self,
-        replay: &Replay,
-        labeled: &[Labeled],
-        passes: &mut [Pass],
-        range: std::ops::Range<usize>,
-    ) {
-        let weight = 1.0 / range.len() as f64;
-        let orders = passes.iter().flat_map(|p| &p.order[range.clone()]);
-        let examples: Vec<Example> = orders.map(|&i| self.example(&labeled[i], weight)).collect();
-        self.parameters.zero_gradient();
-        let logits = self.add_gradient(replay, &examples);
-        let own = examples.chunks(range.len()).zip(logits.chunks(range.len()));
-        for (pass, (examples, logits)) in passes.iter_mut().zip(own) {
-            for (example, logit) in examples.iter().zip(logits) {
-                pass.record(example, *logit);
-            }
-        }
-    }
-
-    /// A preference as the loss sees it.
-    fn example(&self, labeled: &Labeled, weight: f64) -> Example {
-        let certain = f64::from(labeled.preference.target());
-        Example {
-            query: labeled.query,
-            target: certain + self.config.label_margin * (1.0 - 2.0 * certain),
-            weight,
-        }
-    }
-
-    /// One Adam step on examples `[M][n]`; returns their logits before it.
-    fn step(&mut self, replay: &Replay, examples: &[Example]) -> Vec<f64> {
-        self.parameters.zero_gradient();
-        let logits = self.add_gradient(replay, examples);
-        self.parameters.step();
-        logits
-    }
-
-    /// Adds the gradient of examples `[M][n]`; returns their logits. The loss is a sum over
-    /// pairs, so a few pairs at a time go forward and back while their hidden layers are in the
-    /// cache.
-    fn add_gradient(&mut self, replay: &Replay, examples: &[Example]) -> Vec<f64> {
-        let n_members = self.config.members;
-        let n = examples.len() / n_members;
-        let longest = examples
-            .iter()
-            .map(|e| longest(&e.query))
-            .max()
-            .unwrap_or(1);
-        let pairs_at_once = (CHUNK_ROWS / (2 * longest)).max(1);
-        let mut all_logits = vec![0.0; examples.len()];
-        for start in (0..n).step_by(pairs_at_once) {
-            let end = n.min(start + pairs_at_once);
-            let own = |member: usize| member * n + start..member * n + end;
-            let pairs: Vec<Example> = (0..n_members)
-                .flat_map(|member| &examples[own(member)])
-                .copied()
-                .collect();
-            let queries = pairs.iter().map(|e| &e.query);
-            let chunk = self.chunk(replay, queries, longest);
-            let input = self
-                .input(&chunk.rows)
-                .view([n_members as i64, -1, self.columns]);
-            let (output, tape) = self.net.forward_taped(&input);
-            let reward = output.tanh();
-            let logits = chunk.logits(&to_vec(&reward));
-            let slope = |(example, logit): (&Example, &f64)| {
-                let probability = 1.0 / (1.0 + (-logit).exp());
-                (probability - example.target) * example.weight
-            };
-            let slopes: Vec<f64> = pairs.iter().zip(&logits).map(slope).collect();
-            let slopes = matrix(&chunk.row_slopes(&slopes), 1, self.options).view_as(&reward);
-            let gradient = slopes * (1.0 - reward.square());
-            self.net
-                .backward(&tape, &gradient, Some(&mut self.gradient), None);
-            for (member, logits) in logits.chunks(end - start).enumerate() {
-                all_logits[own(member)].copy_from_slice(logits);
-            }
-        }
-        all_logits
     }
 
     /// Each member's logits of its own queries, `[M][n]`.
@@ -606,11 +346,6 @@ pub(crate) fn entropy(probabilities: &[Vec<f32>]) -> Vec<f32> {
     };
     let mean = |query: usize| probabilities.iter().map(|m| own(m[query])).sum::<f32>() / n_members;
     (0..n_queries).map(mean).collect()
-}
-
-/// ln(1 + eˣ) without overflow.
-fn softplus(x: f64) -> f64 {
-    x.max(0.0) + (-x.abs()).exp().ln_1p()
 }
 
 /// Key of the ensemble's initial weights.

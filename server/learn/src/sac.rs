@@ -1,7 +1,6 @@
 //! Soft actor-critic with every gradient written out.
 
 use domain::random::{Rng, Stream};
-use serde::{Deserialize, Serialize};
 use tch::{Kind, Tensor};
 
 use crate::checkpoint::Archive;
@@ -10,109 +9,16 @@ use crate::error::LearnError;
 use crate::init;
 use crate::kernel;
 use crate::net::{Net, NetShape, Parameters, load_tensor, matrix, save_tensor, to_vec};
-use crate::precision::Precision;
 use crate::replay::Batch;
 
+mod config;
 mod outer;
 mod policy;
 
+use config::FIRST_ENTROPY;
+pub use config::SacConfig;
 pub(crate) use outer::FirstSteps;
 use policy::Gaussian;
-
-/// Settings of the agent. Defaults: STAIR's released settings for MetaWorld (which are BPref's).
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct SacConfig {
-    /// Hidden layers of actor and critics.
-    pub hidden: Vec<i64>,
-    /// Transitions in an update, `B`.
-    pub batch: usize,
-    /// Adam's rate for the actor.
-    pub actor_learning_rate: f64,
-    /// Adam's rate for the critics.
-    pub critic_learning_rate: f64,
-    /// Adam's rate for log α.
-    pub alpha_learning_rate: f64,
-    /// γ.
-    pub discount: f64,
-    /// α at the start.
-    ///
-    /// Differs from the paper: its table says 0.2, the released code uses 0.1.
-    pub initial_temperature: f64,
-    /// τ: how far the target critics move towards the critics.
-    ///
-    /// Differs from the paper: its table says 0.01, the released code uses 0.005.
-    pub critic_ema: f64,
-    /// Updates between two movements of the target critics.
-    pub target_every: u64,
-    /// How far the averaged actor, whose mean action is evaluated and kept, moves towards the
-    /// actor at each update, [0, 1]; 0 takes the actor itself, as the released code does.
-    ///
-    /// High rates make the last few updates decide where a mean action lies; an average over
-    /// some 1 / `actor_ema` updates lies where most of them agree.
-    pub actor_ema: f64,
-    /// Share of the learning rates that is left at the run's last step, (0, 1]: they fall in
-    /// a straight line. 1, the released code's, keeps them.
-    pub final_rate: f64,
-    /// Entropy that the policy shall have at the run's last step, nats for each number of an
-    /// action; it is led there from −1 in a straight line. −1, the released code's, stays.
-    ///
-    /// Lower ones make the mean action, which is evaluated, as good as the sampled one. On a
-    /// task reward success holds better with −3; learned rewards, which still move, want the
-    /// chance.
-    pub final_entropy: f64,
-    /// Whether the critics' hidden layers are normalised; the released code's are not. With it,
-    /// higher learning rates hold.
-    pub layer_norm: bool,
-    /// `f32`, or `bf16` for faster and coarser updates.
-    pub precision: Precision,
-}
-
-impl Default for SacConfig {
-    fn default() -> Self {
-        Self {
-            hidden: vec![256; 3],
-            batch: 512,
-            actor_learning_rate: 3e-4,
-            critic_learning_rate: 3e-4,
-            alpha_learning_rate: 1e-4,
-            discount: 0.99,
-            initial_temperature: 0.1,
-            critic_ema: 0.005,
-            target_every: 2,
-            actor_ema: 0.0,
-            final_rate: 1.0,
-            final_entropy: FIRST_ENTROPY,
-            layer_norm: false,
-            precision: Precision::F32,
-        }
-    }
-}
-
-impl SacConfig {
-    /// Actor and critics for states of `s` and actions of `a` numbers.
-    fn shapes(&self, s: i64, a: i64) -> (NetShape, NetShape) {
-        let precision = self.precision;
-        let actor = NetShape {
-            precision,
-            ..NetShape::new(1, s, &self.hidden, 2 * a)
-        };
-        let critic = NetShape {
-            layer_norm: self.layer_norm,
-            precision,
-            ..NetShape::new(2, s + a, &self.hidden, 1)
-        };
-        (actor, critic)
-    }
-
-    /// Bytes that an agent and its updates hold.
-    pub fn bytes(&self, observation_size: usize, action_size: usize) -> u64 {
-        let (actor, critic) = self.shapes(observation_size as i64, action_size as i64);
-        let target = 4 * critic.n_values() as u64;
-        let passes = actor.pass_bytes(self.batch) + critic.pass_bytes(self.batch);
-        actor.trained_bytes() + critic.trained_bytes() + target + passes
-    }
-}
 
 /// How the agent chooses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -533,9 +439,6 @@ const ACTOR_SECTION: &str = "sac.actor";
 /// Where the averaged actor lies, if there is one.
 const AVERAGE_SECTION: &str = "sac.actor.average";
 /// Keys of initial weights: the actor, then the critics of each reset.
-/// Entropy that SAC wants of a policy, nats for each number of an action.
-const FIRST_ENTROPY: f64 = -1.0;
-
 const ACTOR: u64 = 0;
 const FIRST_CRITIC: u64 = 1_000;
 

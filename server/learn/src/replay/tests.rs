@@ -1,4 +1,4 @@
-use domain::random::Stream;
+use domain::random::{Rng, Stream};
 
 use super::*;
 

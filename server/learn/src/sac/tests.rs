@@ -1,4 +1,5 @@
 use super::*;
+use crate::precision::Precision;
 
 const SIZES: (usize, usize) = (5, 3);
 /// How far a bf16 gradient may be from that of f32 at initialisation, relative to its norm.
