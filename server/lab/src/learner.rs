@@ -156,7 +156,6 @@ impl Learner {
             labeled,
             unlabeled,
         };
-        self.reward.measure_inputs(replay);
         self.fitting.fit(&mut self.reward, &lesson)
     }
 

@@ -16,14 +16,12 @@ mod chunk;
 mod config;
 mod denoise;
 mod fit;
-mod inputs;
 mod learner;
 mod meta;
 mod semi;
 
 use chunk::{Chunk, longest};
 use fit::{Example, Pass, summary};
-use inputs::{Inputs, Moments};
 
 pub use config::RewardConfig;
 pub use denoise::{Denoising, DenoisingConfig};
@@ -88,7 +86,6 @@ pub struct RewardEnsemble {
     parameters: Parameters,
     net: Net,
     gradient: Net,
-    inputs: Option<Inputs>,
     scale: Scale,
     n_epochs: u64,
 }
@@ -147,19 +144,8 @@ impl RewardEnsemble {
             gradient: Net::over(&shape, &parameters.gradient, 0),
             parameters,
             net,
-            inputs: None,
             scale: Scale::NONE,
             n_epochs: 0,
-        }
-    }
-
-    /// Takes the level and spread of what is in the replay for those of inputs, where
-    /// [`RewardConfig::normalized_inputs`] asks for it; what is predicted changes with them, so a
-    /// fit comes next.
-    pub fn measure_inputs(&mut self, replay: &Replay) {
-        if self.config.normalized_inputs {
-            let moments = Moments::of(replay);
-            self.inputs = moments.map(|moments| Inputs::new(moments, self.options));
         }
     }
 
@@ -270,7 +256,6 @@ impl RewardEnsemble {
         self.parameters.save("reward", archive);
         archive.put_json("reward.epochs", &self.n_epochs);
         archive.put_f64("reward.scale", &[self.scale.offset, self.scale.factor]);
-        archive.put_json("reward.inputs", &self.inputs.as_ref().map(|i| &i.moments));
     }
 
     /// What [`RewardEnsemble::save`] wrote, from any device.
@@ -282,8 +267,6 @@ impl RewardEnsemble {
         self.n_epochs = archive.json("reward.epochs")?;
         let [offset, factor] = archive.f64("reward.scale")?;
         self.scale = Scale { offset, factor };
-        let moments: Option<Moments> = archive.json("reward.inputs")?;
-        self.inputs = moments.map(|moments| Inputs::new(moments, self.options));
         Ok(())
     }
 
@@ -308,11 +291,7 @@ impl RewardEnsemble {
     }
 
     fn input(&self, rows: &[f32]) -> Tensor {
-        let rows = matrix(rows, self.columns, self.options);
-        match &self.inputs {
-            Some(inputs) => inputs.apply(&rows),
-            None => rows,
-        }
+        matrix(rows, self.columns, self.options)
     }
 }
 

@@ -44,12 +44,6 @@ pub struct RewardConfig {
     /// each fit moves both, and with them every value that the critics know.
     /// Source: Christiano et al. (2017), 2.2.3, who normalise the rewards of their ensemble.
     pub normalized_std: f64,
-    /// Whether each number of a state is brought to mean 0 and standard deviation 1 over the
-    /// replay, anew before each fit, and cut off at 5; the released code takes them as they are.
-    ///
-    /// What decides a preference late in a task is often a centimetre, and networks that see
-    /// metres are slow to tell it.
-    pub normalized_inputs: bool,
     /// `f32`, or `bf16` for faster and coarser fitting and relabelling.
     pub precision: Precision,
 }
@@ -66,7 +60,6 @@ impl Default for RewardConfig {
             label_margin: 0.0,
             temperature: 1.0,
             normalized_std: 0.0,
-            normalized_inputs: false,
             precision: Precision::F32,
         }
     }

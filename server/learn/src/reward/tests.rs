@@ -14,11 +14,6 @@ const EPISODE_LEN: u32 = 20;
 
 /// Random states and actions; the task reward is the first coordinate of the state.
 pub(super) fn replay(n_episodes: u32) -> Replay {
-    replay_in(n_episodes, 1.0)
-}
-
-/// The same where states are measured in a unit of so many.
-fn replay_in(n_episodes: u32, unit: f32) -> Replay {
     let mut replay = Replay::new(SHAPE, 1);
     let mut rng = Rng::new(1, Stream::Test, 0);
     let mut normals = |n: usize| {
@@ -26,17 +21,11 @@ fn replay_in(n_episodes: u32, unit: f32) -> Replay {
         rng.fill_normal(&mut values);
         values
     };
-    let in_units = |mut state: Vec<f32>| {
-        for number in &mut state {
-            *number *= unit;
-        }
-        state
-    };
     for seed in 0..n_episodes {
-        let mut state = in_units(normals(3));
+        let mut state = normals(3);
         replay.begin_episode(0, u64::from(seed), &state, &[], None);
         for t in 0..EPISODE_LEN {
-            let next = in_units(normals(3));
+            let next = normals(3);
             let end = (t + 1 == EPISODE_LEN).then_some(EpisodeEnd::TimeLimit);
             replay.push(
                 0,
@@ -281,40 +270,6 @@ fn the_disagreement_about_a_reward_is_the_members_std_and_goes_to_the_replay() {
     ensemble.relabel(&mut replay);
     let kept = replay.disagreements_mut(0)[EPISODE_LEN as usize + t];
     assert!((kept - std).abs() < 1e-6, "{kept} {std}");
-}
-
-#[test]
-fn a_reward_of_states_in_a_small_unit_is_learned_once_they_are_normalised() {
-    let replay = replay_in(40, 1e-3);
-    let labeled = labeled(&replay, 400, |_| 5);
-    let fitted = |normalized_inputs: bool| {
-        let config = RewardConfig {
-            learning_rate: 3e-3,
-            max_epochs: 40,
-            normalized_inputs,
-            ..small()
-        };
-        let mut ensemble = RewardEnsemble::new(&config, 3, 2, 1, Device::CPU);
-        ensemble.measure_inputs(&replay);
-        let fit = ensemble.fit(&replay, &labeled);
-        (ensemble, fit.accuracy)
-    };
-    let (ensemble, accuracy) = fitted(true);
-    let (_, as_they_are) = fitted(false);
-    assert!(
-        accuracy > 0.9 && as_they_are < 0.8,
-        "{accuracy} and {as_they_are}"
-    );
-
-    let mut archive = Archive::new();
-    ensemble.save(&mut archive);
-    let mut restored = RewardEnsemble::new(&ensemble.config, 3, 2, 2, Device::CPU);
-    restored.load(&archive).unwrap();
-    let (state, action) = ([1e-3, 0.0, -1e-3], [0.5, -0.5]);
-    assert_eq!(
-        restored.predict(&state, &action),
-        ensemble.predict(&state, &action)
-    );
 }
 
 #[test]
