@@ -96,7 +96,7 @@ fn as_text() -> String {
         .collect();
     let presets: Vec<_> = presets()
         .iter()
-        .map(|(name, tasks)| ((*name).to_owned(), format!("for {}", tasks.join(", "))))
+        .map(|(name, tasks)| ((*name).to_owned(), format!("for {}", told(tasks))))
         .collect();
     let teachers: Vec<_> = SCRIPTED
         .iter()
@@ -112,6 +112,15 @@ fn as_text() -> String {
     text
 }
 
+/// An empty name among those of tasks stands for all of them.
+fn told(tasks: &[&str]) -> String {
+    if tasks.contains(&"") {
+        "all tasks".to_owned()
+    } else {
+        tasks.join(", ")
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -123,6 +132,7 @@ mod tests {
             .iter()
             .map(|t| t.name)
             .chain(METHODS.iter().map(|m| m.name));
+        assert!(text.contains("for all tasks"), "paper_table");
         for name in names.chain(["quick", "oracle", "mistaken"]) {
             assert!(text.contains(name) && json.contains(name), "{name}");
         }

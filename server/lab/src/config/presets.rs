@@ -5,8 +5,8 @@ use toml::{Table, Value};
 use super::layers::{invalid, merge};
 use super::{ConfigError, RunConfig, unknown};
 
-/// `(name, task or "", text)` of every preset. A method's and `paper_table` hold for any task;
-/// `task` and `quick` have a text for each.
+/// `(name, task or "", text)` of every preset. A method's holds for any task, `task` and `quick`
+/// have a text for each; where there are both, the task's own comes on top.
 ///
 /// The list is made at build time: a preset is a file in `assets/presets`, or in the folder
 /// there of its kind, and nothing else.
@@ -21,28 +21,38 @@ pub(crate) fn preset_names() -> Vec<&'static str> {
     known
 }
 
-/// A preset's own keys, on top of those of the preset that it is `like`: another task's of the
-/// same name.
+/// A preset's own keys: those for any task, and on top of them the task's own.
 ///
 /// # Errors
 /// When there is none of that name for the task.
 pub(super) fn preset(name: &str, task: &str) -> Result<Table, ConfigError> {
-    let found = PRESETS
-        .iter()
-        .find(|(n, t, _)| *n == name && (t.is_empty() || *t == task));
-    let Some((_, _, text)) = found else {
+    let (general, own) = (layer(name, "")?, layer(name, task)?);
+    if general.is_none() && own.is_none() {
         return Err(unknown("preset", name, preset_names().into_iter()));
+    }
+    let mut all = general.unwrap_or_default();
+    merge(&mut all, &own.unwrap_or_default());
+    Ok(all)
+}
+
+/// The keys of one file, on top of those of the file that it is `like`: another task's of the
+/// same preset. `None` where there is no such file.
+fn layer(name: &str, task: &str) -> Result<Option<Table>, ConfigError> {
+    let found = PRESETS.iter().find(|(n, t, _)| (*n, *t) == (name, task));
+    let Some((_, _, text)) = found else {
+        return Ok(None);
     };
     let origin = format!("preset {name}");
     let own: Table = toml::from_str(text).map_err(|error| invalid(&origin, text, &error))?;
     let (like, own): (Table, Table) = own.into_iter().partition(|(key, _)| key == "like");
     let own = checked(&origin, own)?;
-    let Some(other) = like.get("like").and_then(Value::as_str) else {
-        return Ok(own);
+    let other = like.get("like").and_then(Value::as_str);
+    let mut all = match other {
+        Some(other) => layer(name, other)?.unwrap_or_default(),
+        None => Table::new(),
     };
-    let mut all = preset(name, other)?;
     merge(&mut all, &own);
-    Ok(all)
+    Ok(Some(all))
 }
 
 /// Keys that settings have; a shipped preset has no line worth naming.
@@ -66,6 +76,16 @@ mod tests {
         like["feedback"]["queries_per_session"] = Value::Integer(120);
         like["feedback"]["budget"] = Value::Integer(3000);
         assert_eq!(own, like);
+    }
+
+    #[test]
+    fn a_tasks_own_preset_comes_on_top_of_the_one_for_all() {
+        let (all, walker) = ("window-open", "quadruped-run");
+        let rate =
+            |task| preset("paper_table", task).unwrap()["reward"]["learning_rate"].as_float();
+        assert_eq!((rate(all), rate(walker)), (Some(1e-4), Some(5e-4)));
+        let own = preset("paper_table", walker).unwrap();
+        assert_eq!(own["agent"]["critic_ema"].as_float(), Some(0.01));
     }
 
     #[test]
