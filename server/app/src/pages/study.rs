@@ -48,6 +48,14 @@ struct TaskLine {
     n_pairs: usize,
     n_answers: u32,
     n_wanted: u32,
+    /// In an order that tells nothing of how they were chosen.
+    pairs: Vec<PairCell>,
+}
+
+/// How far a pair is.
+struct PairCell {
+    n_answers: u32,
+    is_full: bool,
 }
 
 /// A place.
@@ -162,8 +170,15 @@ async fn filled_in(
     });
     let tasks = file.tasks.iter().enumerate().map(|(number, name)| {
         let own = |item: &&ItemLine| item.task == number as u32 && item.role == "counted";
-        let own: Vec<&ItemLine> = items.iter().filter(own).collect();
+        let mut own: Vec<&ItemLine> = items.iter().filter(own).collect();
+        // By what their pictures hash to: their own order would tell one method from another.
+        own.sort_by(|a, b| a.clips.cmp(&b.clips));
+        let cell = |item: &&ItemLine| PairCell {
+            n_answers: item.n_answers,
+            is_full: item.n_answers >= file.labelers_per_item,
+        };
         TaskLine {
+            pairs: own.iter().map(cell).collect(),
             title: title(name),
             n_pairs: own.len(),
             n_answers: own.iter().map(|item| item.n_answers).sum(),
