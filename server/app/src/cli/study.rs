@@ -29,7 +29,7 @@ enum Action {
   stair study check task-1          a study that comes with the program
   stair study check my-study.toml")]
     Check {
-        /// A file, or the name of a ready study: task-1, task-1-demo, task-2-demo
+        /// A file, or the name of a ready study: task-1, task-1-demo, task-2, task-2-demo
         file: PathBuf,
     },
     /// Pack the queries of a finished run into one small file, to be asked in studies

@@ -66,7 +66,7 @@ impl Which {
 
 A preparation that is interrupted goes on by itself when the server starts again.")]
 pub(super) struct PrepareArgs {
-    /// A file, or the name of a ready study: task-1, task-1-demo, task-2-demo
+    /// A file, or the name of a ready study: task-1, task-1-demo, task-2, task-2-demo
     file: PathBuf,
     /// Let labelers answer as soon as it is ready
     #[arg(long)]
