@@ -305,3 +305,26 @@ fn at_a_server_with_a_token_a_labeler_needs_nothing_but_their_link() {
     }
     assert_eq!(study.labels().len(), 9);
 }
+
+#[test]
+fn a_study_that_was_opened_stays_as_its_file_was() {
+    let study = Open::start("preference");
+    let put = |text: &str, status| {
+        let body = json!({"text": text});
+        let reply = study.researcher.send("PUT", &study.path, Some(&body));
+        reply.expect(status)
+    };
+    let text = small("preference");
+    assert_eq!(put(&text, 200).json()["state"], "open");
+    let refused = put(
+        &text.replace("labels_per_task = 6", "labels_per_task = 4"),
+        409,
+    );
+    assert!(
+        refused.text.contains("study of its own"),
+        "{}",
+        refused.text
+    );
+    let labeler = study.labeler();
+    assert_eq!(answer_all(&labeler, "left").len(), 9, "nothing has changed");
+}

@@ -42,6 +42,7 @@ pub mod tasks;
         studies::list,
         studies::create,
         studies::read,
+        studies::keep,
         studies::retry,
         studies::open,
         studies::close,

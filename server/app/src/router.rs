@@ -99,7 +99,10 @@ fn api() -> Router<AppState> {
         )
         .route("/api/v1/clips/{name}", get(clips::file))
         .route("/api/v1/studies", get(studies::list).post(studies::create))
-        .route("/api/v1/studies/{id}", get(studies::read))
+        .route(
+            "/api/v1/studies/{id}",
+            get(studies::read).put(studies::keep),
+        )
         .route("/api/v1/studies/{id}/retry", post(studies::retry))
         .route("/api/v1/studies/{id}/open", post(studies::open))
         .route("/api/v1/studies/{id}/close", post(studies::close))

@@ -102,22 +102,51 @@ pub async fn create(
     State(app): State<AppState>,
     Body(request): Body<StudyRequest>,
 ) -> Result<Response, Problem> {
-    let (name, text, folder) = match (&request.name, &request.text) {
-        (Some(name), None) => (name.clone(), ready(name)?.to_owned(), String::new()),
-        (None, Some(text)) => {
-            let folder = request.folder.clone().unwrap_or_default();
-            ("the study's file".to_owned(), text.clone(), folder)
-        }
-        _ => {
-            let detail = "Send either the name of a ready study or the text of a file.";
-            return Err(Problem::unusable_study(detail));
-        }
+    let (name, text) = file_of(&request)?;
+    let folder = match request.text {
+        Some(_) => request.folder.unwrap_or_default(),
+        None => String::new(), // its sets are in the program
     };
     let id = begin(&app, &name, text, folder).await?;
     let view = view(&app, app.store.study(id).await?).await?;
     let address = format!("/api/v1/studies/{id}");
     let located = [(header::LOCATION, address)];
     Ok((StatusCode::CREATED, located, Json(view)).into_response())
+}
+
+/// A study stays as its file was: what is drawn and answered belongs to that. The same file again
+/// changes nothing.
+///
+/// # Errors
+/// Another file, which makes a study of its own.
+#[utoipa::path(put, path = "/api/v1/studies/{id}", tag = "studies", params(("id" = i64, Path)), request_body = StudyRequest,
+    responses((status = 200, body = StudyView), (status = 404, body = Problem), (status = 409, body = Problem)))]
+pub async fn keep(
+    State(app): State<AppState>,
+    Study(study): Study,
+    Body(request): Body<StudyRequest>,
+) -> Result<Json<StudyView>, Problem> {
+    let (_, text) = file_of(&request)?;
+    if text != study.file {
+        let told = "its pairs and answers belong to its file; prepare a copy with the changes, which is a study of its own";
+        let state = study.state;
+        return Err(StoreError::StudyState { state, told }.into());
+    }
+    Ok(Json(view(&app, study).await?))
+}
+
+/// What to call the file of a request, and its text.
+///
+/// # Errors
+/// Neither or both of a name and a text; an unknown name.
+fn file_of(request: &StudyRequest) -> Result<(String, String), Problem> {
+    match (&request.name, &request.text) {
+        (Some(name), None) => Ok((name.clone(), ready(name)?.to_owned())),
+        (None, Some(text)) => Ok(("the study's file".to_owned(), text.clone())),
+        _ => Err(Problem::unusable_study(
+            "Send either the name of a ready study or the text of a file.",
+        )),
+    }
 }
 
 /// The text of a study that comes with the program.
