@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use crate::stories::server_process::{ServerProcess, wait_for};
+use crate::stories::server_process::{ServerProcess, stair, wait_for};
 use crate::support::Client;
 
 /// A small study of the small task: six pairs, one practice, one check, one repeat.
@@ -34,6 +34,9 @@ first = { policy = "expert", seed = 3, start = 20 }
 second = { policy = "random", seed = 3, start = 0 }
 expects = "WRONG"
 "#;
+
+/// The token of a server that wants one.
+const GUARD: &str = "not-to-be-guessed-0";
 
 /// The small study with one of both questions.
 pub(crate) fn small(question: &str) -> String {
@@ -73,10 +76,9 @@ impl Open {
 
     /// The small study at a server that wants a token, which its researcher has.
     pub(crate) fn guarded(question: &str) -> Self {
-        let token = "not-to-be-guessed-0";
         let folder = tempfile::tempdir().expect("a temporary folder");
-        let server = ServerProcess::start_guarded(folder.path(), token);
-        let researcher = Client::stranger_of(&server).with_token(token);
+        let server = ServerProcess::start_guarded(folder.path(), GUARD);
+        let researcher = Client::stranger_of(&server).with_token(GUARD);
         let request = json!({"text": small(question)});
         Self::made(server, researcher, folder, &request)
     }
@@ -304,6 +306,17 @@ fn at_a_server_with_a_token_a_labeler_needs_nothing_but_their_link() {
         get(&labeler, &researchers, 401);
     }
     assert_eq!(study.labels().len(), 9);
+    let export = |token: &str| {
+        let server = format!("http://{}", study.server.address);
+        let mut stair = stair();
+        stair.args([
+            "study", "export", "1", "--format", "jsonl", "--server", &server,
+        ]);
+        stair.args(["--token", token]).output().expect("stair")
+    };
+    let told = export(GUARD);
+    assert_eq!(String::from_utf8_lossy(&told.stdout).lines().count(), 9);
+    assert_eq!(export("wrong").status.code(), Some(2));
 }
 
 #[test]

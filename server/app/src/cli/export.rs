@@ -29,7 +29,7 @@ pub struct Args {
     /// A data folder that no server holds
     #[arg(long, value_name = "DIR", default_value = "data")]
     data: PathBuf,
-    /// A server, instead of a data folder
+    /// A server, instead of a data folder; its token, where it wants one, is taken from STAIR_TOKEN
     #[arg(long, value_name = "URL", conflicts_with = "data")]
     server: Option<String>,
     /// What to write
@@ -46,29 +46,34 @@ pub struct Args {
 /// [`BadInput`] for an unknown run, a folder without data or held by a server; a file that
 /// cannot be written.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
-    match &args.out {
-        Some(path) => {
-            let told = || format!("cannot write {}", path.display());
-            // Beside it first: a table that ends early must not look whole.
-            let part = path.with_added_extension("part");
-            let mut file = BufWriter::new(File::create(&part).with_context(told)?);
-            let written = export(args, &mut file).and_then(|()| file.flush().with_context(told));
-            if written.is_err() {
-                let _ = std::fs::remove_file(&part); // it may be gone; the first error is told
-            }
-            written?;
-            std::fs::rename(&part, path).with_context(told)?;
-        }
-        None => export(args, &mut std::io::stdout().lock())?,
-    }
+    write_to(args.out.as_deref(), |to| match &args.server {
+        Some(server) => from_server(server, args, to),
+        None => from_folder(args, to),
+    })?;
     Ok(ExitCode::SUCCESS)
 }
 
-fn export(args: &Args, to: &mut impl Write) -> anyhow::Result<()> {
-    match &args.server {
-        Some(server) => from_server(server, args, to),
-        None => from_folder(args, to),
+/// Writes a table to a file, whole or not at all, or to the terminal.
+///
+/// # Errors
+/// What `write` says; a file that cannot be written.
+pub(super) fn write_to(
+    out: Option<&Path>,
+    write: impl FnOnce(&mut dyn Write) -> anyhow::Result<()>,
+) -> anyhow::Result<()> {
+    let Some(path) = out else {
+        return write(&mut std::io::stdout().lock());
+    };
+    let told = || format!("cannot write {}", path.display());
+    // Beside it first: a table that ends early must not look whole.
+    let part = path.with_added_extension("part");
+    let mut file = BufWriter::new(File::create(&part).with_context(told)?);
+    let written = write(&mut file).and_then(|()| file.flush().with_context(told));
+    if written.is_err() {
+        let _ = std::fs::remove_file(&part); // it may be gone; the first error is told
     }
+    written?;
+    std::fs::rename(&part, path).with_context(told)
 }
 
 /// What is exported: `runs` or `studies`, with the number that was typed.
@@ -79,7 +84,7 @@ fn asked(args: &Args) -> (&'static str, &str) {
     }
 }
 
-fn from_server(server: &str, args: &Args, to: &mut impl Write) -> anyhow::Result<()> {
+fn from_server(server: &str, args: &Args, mut to: &mut dyn Write) -> anyhow::Result<()> {
     let (kind, id) = asked(args);
     let mut client = Client::new(server, Duration::from_secs(30))?;
     let path = format!(
@@ -87,10 +92,13 @@ fn from_server(server: &str, args: &Args, to: &mut impl Write) -> anyhow::Result
         path_segment(id)?,
         args.format.word()
     );
-    client.download(&path, to)
+    if let Ok(token) = std::env::var("STAIR_TOKEN") {
+        client.authorize(token);
+    }
+    client.download(&path, &mut to)
 }
 
-fn from_folder(args: &Args, to: &mut impl Write) -> anyhow::Result<()> {
+fn from_folder(args: &Args, to: &mut dyn Write) -> anyhow::Result<()> {
     let (kind, id) = asked(args);
     let what = if kind == "runs" { "run" } else { "study" };
     let unknown = || {

@@ -39,6 +39,7 @@ enum Action {
     Invite(remote::InviteArgs),
     Status(remote::StatusArgs),
     Close(remote::CloseArgs),
+    Export(remote::ExportArgs),
     Answer(answer::Args),
     Report(report::Args),
 }
@@ -56,6 +57,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         Action::Invite(args) => remote::invite(args)?,
         Action::Status(args) => remote::status(args)?,
         Action::Close(args) => remote::close(args)?,
+        Action::Export(args) => remote::export(args)?,
         Action::Answer(args) => answer::run(args)?,
         Action::Report(args) => report::run(args)?,
     }

@@ -9,8 +9,10 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
 
 use super::super::client::{Client, path_segment};
+use super::super::export::write_to;
 use super::super::say;
 use super::read;
+use crate::label_table::TableFormat;
 
 /// How long a server may be away in the middle.
 const PATIENCE: Duration = Duration::from_mins(2);
@@ -207,6 +209,37 @@ fn described(study: &Value) -> String {
     told
 }
 
+/// Write a study's answers as a table, one row each, from a running server
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  stair study export 1 --out answers.csv
+  stair study export 1 --format parquet --out answers.parquet
+
+Methods are in it once the study is closed. A data folder that no server holds is read by
+`stair export --study`.")]
+pub(super) struct ExportArgs {
+    #[command(flatten)]
+    which: Which,
+    /// What to write
+    #[arg(long, value_enum, default_value_t = TableFormat::Csv)]
+    format: TableFormat,
+    /// Where to [default: the terminal]
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+pub(super) fn export(args: &ExportArgs) -> anyhow::Result<()> {
+    let path = format!(
+        "{}/labels?format={}",
+        args.which.path()?,
+        args.format.word()
+    );
+    let mut client = args.which.server.client()?;
+    write_to(args.out.as_deref(), |mut to| {
+        client.download(&path, &mut to)
+    })
+}
+
 /// Take no more answers, and tell from now on which method chose which pair
 #[derive(Debug, clap::Args)]
 pub(super) struct CloseArgs {
@@ -222,7 +255,7 @@ pub(super) fn close(args: &CloseArgs) -> anyhow::Result<()> {
         .post(&format!("{path}/close"), &json!({}))?;
     let id = &args.which.study;
     say(&format!(
-        "Study {id} is closed.\nNext: stair export --study {id} --server {} --out answers.csv\n",
+        "Study {id} is closed.\nNext: stair study export {id} --server {} --out answers.csv\n",
         args.which.server.server
     ))
 }

@@ -13,7 +13,7 @@ use crate::study_results::{Results, results};
 /// Draw the figures of exported answers and compute their measures
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
-  stair export --study 1 --server http://127.0.0.1:8080 --format parquet --out answers.parquet
+  stair study export 1 --format parquet --out answers.parquet
   stair study report answers.parquet --out report")]
 pub(super) struct Args {
     /// Answers as `stair export` wrote them: .csv, .jsonl or .parquet
