@@ -24,6 +24,7 @@ mod problem;
 mod router;
 mod state;
 mod study_results;
+mod worker;
 
 fn main() -> ExitCode {
     cli::main()

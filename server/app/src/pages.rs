@@ -31,21 +31,6 @@ fn show(template: &impl Template) -> Response {
     }
 }
 
-/// Work of milliseconds to seconds, such as reading rows and making a report: not on the threads
-/// that serve.
-///
-/// # Errors
-/// A worker that ended before its work.
-pub async fn in_worker<T: Send + 'static>(
-    work: impl FnOnce() -> T + Send + 'static,
-) -> Result<T, Problem> {
-    let done = tokio::task::spawn_blocking(work).await;
-    done.map_err(|error| {
-        tracing::error!("a page's worker ended: {error}");
-        Problem::internal()
-    })
-}
-
 /// The task as people read it; a task that this program no longer knows keeps its name out.
 fn title(task: &str) -> &'static str {
     sim::tasks::task(task).map_or("A task of another version", |task| task.title)

@@ -13,10 +13,10 @@ use utoipa::ToSchema;
 use super::labels::{Format, exported};
 use crate::extract::{Body, Study};
 use crate::live::parse_study;
-use crate::pages::in_worker;
 use crate::problem::Problem;
 use crate::state::AppState;
 use crate::study_results;
+use crate::worker::in_worker;
 
 const DAY_MS: i64 = 24 * 60 * 60 * 1000;
 /// Days for which a link works, unless said otherwise, and at most.

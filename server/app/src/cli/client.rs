@@ -70,6 +70,13 @@ impl Client {
         self.token = Some(token);
     }
 
+    /// Sends the server's own token from now on: the one that is given, else `STAIR_TOKEN`, else
+    /// none.
+    pub(super) fn enter(&mut self, token: Option<&str>) {
+        let token = token.map(str::to_owned);
+        self.token = token.or_else(|| std::env::var("STAIR_TOKEN").ok());
+    }
+
     /// Does `POST path` and sends from now on the cookie that the reply sets, as the browser of a
     /// labeler does who signs in.
     ///

@@ -92,9 +92,7 @@ fn from_server(server: &str, args: &Args, mut to: &mut dyn Write) -> anyhow::Res
         path_segment(id)?,
         args.format.word()
     );
-    if let Ok(token) = std::env::var("STAIR_TOKEN") {
-        client.authorize(token);
-    }
+    client.enter(None);
     client.download(&path, &mut to)
 }
 

@@ -8,10 +8,11 @@ use lab::experiment::Artifact;
 
 use super::experiments::state;
 use super::markdown::to_html;
-use super::{in_worker, show, thousands};
+use super::{show, thousands};
 use crate::experiments::{self, Experiment, Running};
 use crate::problem::Problem;
 use crate::state::AppState;
+use crate::worker::in_worker;
 
 #[derive(Template)]
 #[template(path = "experiment.html")]

@@ -4,10 +4,11 @@ use askama::Template;
 use axum::extract::State;
 use axum::response::Response;
 
-use super::{in_worker, show, thousands};
+use super::{show, thousands};
 use crate::experiments::{self, Experiment};
 use crate::problem::Problem;
 use crate::state::AppState;
+use crate::worker::in_worker;
 
 #[derive(Template)]
 #[template(path = "experiments.html")]

@@ -8,13 +8,14 @@ use serde::Deserialize;
 use store::{ItemLine, StudyRow};
 
 use super::studies::{message, question_words};
-use super::{in_worker, show, title};
+use super::{show, title};
 use crate::api::studies::{self as api, DAYS, SeatView};
 use crate::extract::Study;
 use crate::live::parse_study;
 use crate::problem::Problem;
 use crate::state::AppState;
 use crate::study_results::{self, Measure};
+use crate::worker::in_worker;
 
 #[derive(Template)]
 #[template(path = "study.html")]

@@ -46,13 +46,31 @@ fn layer(name: &str, task: &str) -> Result<Option<Table>, ConfigError> {
     let own: Table = toml::from_str(text).map_err(|error| invalid(&origin, text, &error))?;
     let (like, own): (Table, Table) = own.into_iter().partition(|(key, _)| key == "like");
     let own = checked(&origin, own)?;
-    let other = like.get("like").and_then(Value::as_str);
-    let mut all = match other {
-        Some(other) => layer(name, other)?.unwrap_or_default(),
+    let mut all = match like.get("like") {
+        Some(other) => below(name, other)?,
         None => Table::new(),
     };
     merge(&mut all, &own);
     Ok(Some(all))
+}
+
+/// The keys of the file that another is `like`.
+///
+/// # Errors
+/// When it is no name of a task, or that of a task for which the preset has no file.
+fn below(name: &str, like: &Value) -> Result<Table, ConfigError> {
+    let found = match like.as_str() {
+        Some(task) if !task.is_empty() => layer(name, task)?,
+        _ => None,
+    };
+    found.ok_or_else(|| {
+        let known = PRESETS.iter().filter(|(n, ..)| *n == name);
+        unknown(
+            "task to be like",
+            &like.to_string(),
+            known.map(|(_, t, _)| *t),
+        )
+    })
 }
 
 /// Keys that settings have; a shipped preset has no line worth naming.
@@ -86,6 +104,14 @@ mod tests {
         assert_eq!((rate(all), rate(walker)), (Some(1e-4), Some(5e-4)));
         let own = preset("paper_table", walker).unwrap();
         assert_eq!(own["agent"]["critic_ema"].as_float(), Some(0.01));
+    }
+
+    #[test]
+    fn a_preset_that_is_like_none_is_refused() {
+        for like in [Value::String("window-opne".into()), Value::Integer(3)] {
+            let told = below("quick", &like).unwrap_err().to_string();
+            assert!(told.contains(&like.to_string()), "{told}");
+        }
     }
 
     #[test]

@@ -71,6 +71,7 @@ const NAME: Font = Font {
     color: INK,
     is_strong: false,
 };
+
 const NOTE: &str = "Below each picture: the step that led to it. Place 1 is the query that the method ranked first in its round.";
 
 fn make(request: &Request) -> Result<String, FigureError> {

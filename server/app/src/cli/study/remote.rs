@@ -43,13 +43,7 @@ pub(super) struct Server {
 impl Server {
     pub(super) fn client(&self) -> anyhow::Result<Client> {
         let mut client = Client::new(&self.server, PATIENCE)?;
-        let token = self
-            .token
-            .clone()
-            .or_else(|| std::env::var("STAIR_TOKEN").ok());
-        if let Some(token) = token {
-            client.authorize(token);
-        }
+        client.enter(self.token.as_deref());
         Ok(client)
     }
 }

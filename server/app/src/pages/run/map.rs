@@ -12,9 +12,9 @@ use lab::temporal_map::{MapError, TemporalMap, is_learned_by};
 use tokio::sync::Semaphore;
 
 use crate::extract::Run;
-use crate::pages::in_worker;
 use crate::problem::Problem;
 use crate::state::AppState;
+use crate::worker::in_worker;
 
 /// A map reads all that the run has seen into memory: one at a time.
 static READING: Semaphore = Semaphore::const_new(1);

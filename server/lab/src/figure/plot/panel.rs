@@ -44,6 +44,7 @@ const TITLE: Font = Font {
     color: INK,
     is_strong: true,
 };
+
 impl Panel {
     /// Where a point lies on the sheet.
     pub(crate) fn at(&self, (x, y): (f64, f64)) -> (f64, f64) {
