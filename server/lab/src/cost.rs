@@ -25,7 +25,7 @@ pub fn time_here(config: &RunConfig, spec: &EnvSpec) -> Duration {
 /// anything, so the temporal distance counts, and so do the trials.
 pub fn core_time_here(config: &RunConfig, spec: &EnvSpec) -> Duration {
     let trial = f64::from(config.evaluation.episodes) * f64::from(spec.episode_len);
-    let trials = config.training.total_steps / config.evaluation.every.max(1);
+    let trials = 1 + config.training.total_steps / config.evaluation.every.max(1);
     let temporal = temporal_gigaflop(config, spec) / (SHARE * gigaflop_per_second());
     let beside = temporal + STEP_S * trial * trials as f64;
     time_here(config, spec) + Duration::from_secs_f64(beside)

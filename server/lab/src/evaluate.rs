@@ -3,6 +3,8 @@
 use domain::environment::{EnvError, Environment};
 use domain::random::{Rng, Stream};
 
+use crate::stepping::{n_cores, step_all};
+
 /// What `evaluate` saw.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trial {
@@ -74,7 +76,8 @@ pub fn held_out_seed(seed: u64, index: u32) -> u64 {
     Rng::new(seed, Stream::EvaluationSeed, u64::from(index)).next_u64()
 }
 
-/// Runs `n_episodes` side by side, each to its end.
+/// Runs `n_episodes` side by side, each to its end, on as many threads as there are cores: their
+/// number changes no result.
 ///
 /// # Errors
 /// Whatever an environment refuses.
@@ -100,20 +103,23 @@ pub fn evaluate(
     let mut is_running = vec![true; n];
     for t in 0..spec.episode_len {
         let actions = policy(&observations, t);
-        for (index, env) in envs.iter_mut().enumerate() {
-            if !is_running[index] {
-                continue;
-            }
+        let act = |index: usize| &actions[index * spec.action_size..][..spec.action_size];
+        let running: Vec<usize> = (0..n).filter(|index| is_running[*index]).collect();
+        let turns = envs
+            .iter_mut()
+            .enumerate()
+            .filter(|(index, _)| is_running[*index]);
+        let turns = turns.map(|(index, env)| (&mut **env as &mut dyn Environment, act(index)));
+        let steps = step_all(turns.collect(), n_cores())?;
+        for (index, step) in running.into_iter().zip(&steps) {
             let state = &mut observations[index * spec.observation_size..][..spec.observation_size];
-            let action = &actions[index * spec.action_size..][..spec.action_size];
-            let step = env.step(action)?;
             if index < N_KEPT {
                 trial.kept.observations.extend_from_slice(state);
-                trial.kept.actions.extend_from_slice(action);
+                trial.kept.actions.extend_from_slice(act(index));
                 trial.kept.task_rewards.push(step.task_reward.0);
             }
             if index == 0 {
-                trial.poses.push(env.pose());
+                trial.poses.push(envs[0].pose());
             }
             trial.returns[index] += step.task_reward.0;
             if step.success && trial.first_success[index].is_none() {

@@ -15,6 +15,7 @@ pub mod nearest;
 pub mod policy;
 pub mod record;
 pub mod run;
+pub mod stepping;
 pub mod study;
 pub mod temporal_map;
 

@@ -161,6 +161,10 @@ pub struct Evaluation {
     pub return_std: f64,
     /// Pearson correlation of learned and task reward over all steps of these episodes.
     pub reward_correlation: Option<f64>,
+    /// Task return of each episode; the same episodes in the same order at every evaluation. Empty
+    /// in rows of older programs.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub returns: Vec<f64>,
 }
 
 /// An episode to draw.

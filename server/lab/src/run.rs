@@ -103,6 +103,9 @@ impl Run {
     ) -> Result<Outcome, RunError> {
         learn::device::init();
         self.offer_open_queries(teacher)?;
+        if self.progress.step == 0 && self.progress.last_evaluation.is_none() {
+            self.evaluate(events)?; // what learning is measured against
+        }
         while !self.is_over() {
             if self.obey(commands) == Some(Command::Stop) {
                 self.checkpoint_and_say(events)?;

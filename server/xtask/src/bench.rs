@@ -5,7 +5,7 @@ use crate::workspace::Workspace;
 use crate::{child, setup};
 
 /// Crates with an example named `bench`, cheapest to build first.
-pub(crate) const CRATES: [&str; 3] = ["sim", "learn", "render"];
+pub(crate) const CRATES: [&str; 4] = ["sim", "learn", "lab", "app"];
 
 /// Builds and runs the benchmarks of the named crates; none named means all.
 ///

@@ -37,7 +37,7 @@ Commands:
   serve [ARGUMENTS]  start the server (release build), e.g. cargo xtask serve --bind 127.0.0.1:9000
   test               everything that must pass: format, lints, tests, documentation
   setup              only install what is missing (serve, test and bench do it by themselves)
-  bench [CRATE…]     measure this machine: sim, learn, render
+  bench [CRATE…]     measure this machine: sim, learn, lab, app
 
 cargo xtask <COMMAND> --help tells more.";
 
@@ -80,8 +80,9 @@ Installs what is missing, builds the benchmarks with every optimisation and prin
 
 Usage: cargo xtask bench [CRATE…]
 
-Crates: sim (control steps per second), learn (milliseconds per update), render (milliseconds per
-frame). Without one, all in turn. Keep the machine otherwise idle.";
+Crates: sim (control steps per second of every task), learn (milliseconds per update), lab (64
+environments on one thread and on two, steps per second of runs), app (milliseconds per frame of
+every task). Without one, all in turn. Keep the machine otherwise idle.";
 
 /// Reads the command line.
 ///
@@ -236,8 +237,8 @@ mod tests {
 
     #[test]
     fn a_benchmark_of_an_unknown_crate_is_refused() {
-        let failure = parse_words("bench rendr").expect_err("no such crate");
-        assert!(failure.message.contains("did you mean 'render'?"));
+        let failure = parse_words("bench lern").expect_err("no such crate");
+        assert!(failure.message.contains("did you mean 'learn'?"));
     }
 
     #[test]

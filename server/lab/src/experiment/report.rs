@@ -14,7 +14,7 @@ mod comparable;
 mod score;
 mod table;
 
-pub use score::{Reached, Score, area, reached, score};
+pub use score::{Learned, Reached, Score, area, learned, reached, score};
 
 /// A file of rows.
 #[derive(Debug, Clone)]

@@ -19,6 +19,7 @@ impl Run {
             return_mean: trial.return_mean(),
             return_std: trial.return_std(),
             reward_correlation: self.reward_correlation(&trial),
+            returns: trial.returns,
         });
         self.say(event, events)
     }

@@ -1,6 +1,6 @@
 //! What one run came to, as single numbers.
 
-use domain::agreement::mean;
+use domain::agreement::{Bootstrap, Estimate, mean};
 
 use crate::experiment::results::RunResult;
 use crate::message::Evaluation;
@@ -27,17 +27,45 @@ pub struct Reached {
     pub labels: u32,
 }
 
-/// The run's score; NaN for a run that was never tried.
+/// The run's score; NaN for a run that was never tried after it began.
 pub fn score(run: &RunResult) -> Score {
-    let from = run.evaluations.len().saturating_sub(N_LAST);
-    let last: Vec<f64> = run.evaluations[from..]
-        .iter()
-        .map(|e| value(run, e))
-        .collect();
+    let tried = run.evaluations.iter().filter(|e| e.step > 0);
+    let mut last: Vec<f64> = tried.map(|e| value(run, e)).collect();
+    last.drain(..last.len().saturating_sub(N_LAST));
     Score {
         value: mean(&last),
         n_evaluations: last.len(),
     }
+}
+
+/// Task returns of the same held-out episodes, before the first step and after the last.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Learned {
+    /// Mean over episodes, of fresh weights.
+    pub before: f64,
+    /// Mean over episodes, of the weights that the run left.
+    pub after: f64,
+    /// Of the episodes' differences, with the interval of their mean.
+    pub difference: Estimate,
+    /// Episodes.
+    pub n_episodes: usize,
+}
+
+/// What the run learned; `None` where its rows do not tell single episodes or the beginning.
+pub fn learned(run: &RunResult) -> Option<Learned> {
+    let first = run.evaluations.iter().find(|e| e.step == 0)?;
+    let last = run.evaluations.last().filter(|e| e.step > 0)?;
+    if first.returns.len() != last.returns.len() {
+        return None;
+    }
+    let pairs = last.returns.iter().zip(&first.returns);
+    let pairs: Vec<(f64, f64)> = pairs.map(|(after, before)| (*after, *before)).collect();
+    Some(Learned {
+        before: mean(&first.returns),
+        after: mean(&last.returns),
+        difference: Bootstrap::default().paired_difference(&pairs)?,
+        n_episodes: pairs.len(),
+    })
 }
 
 /// When success first was at least a share.

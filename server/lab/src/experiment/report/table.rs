@@ -1,9 +1,9 @@
 //! The numbers of a report: Markdown for people, CSV for programs.
 
-use domain::agreement::{Bootstrap, Estimate, interquartile_mean};
+use domain::agreement::{Bootstrap, Estimate, interquartile_mean, mean};
 
 use super::comparable::{counted, revisions};
-use super::score::{Reached, area, gap_ratio, reached, same_stage, score};
+use super::score::{Learned, Reached, area, gap_ratio, learned, reached, same_stage, score};
 use super::{Group, RunResult, Runs};
 use crate::figure::LEAST_FOR_INTERVAL;
 use crate::method::METHODS;
@@ -66,6 +66,7 @@ pub(super) fn markdown(runs: &Runs) -> String {
         add(&mut text, format!("\n## {task}\n"));
         scores(&mut text, runs, &of_task);
         differences(&mut text, runs, &of_task);
+        learning(&mut text, runs, &of_task);
         alignment(&mut text, runs, &of_task);
     }
     over_all_tasks(&mut text, runs, &groups);
@@ -211,6 +212,49 @@ fn difference(pairs: &[(f64, f64)], is_rate: bool) -> String {
             if is_sure { format!("**{told}**") } else { told }
         },
     )
+}
+
+/// Whether anything was learned at all.
+fn learning(text: &mut String, runs: &Runs, groups: &[&Group]) {
+    let mut lines = String::new();
+    for group in groups {
+        let found: Vec<Learned> = members(runs, group)
+            .into_iter()
+            .filter_map(learned)
+            .collect();
+        if found.is_empty() {
+            continue;
+        }
+        let of = |f: fn(&Learned) -> f64| mean(&found.iter().map(f).collect::<Vec<_>>());
+        let by_seed: Vec<String> = found
+            .iter()
+            .map(|learned| {
+                let told = estimate(&learned.difference, false);
+                let is_sure = !learned.difference.interval.contains(0.0);
+                if is_sure { format!("**{told}**") } else { told }
+            })
+            .collect();
+        add(
+            &mut lines,
+            format!(
+                "| {} | {} | {} | {:.0} | {:.0} | {} |\n",
+                group.method,
+                or_dash(&group.setting),
+                found[0].n_episodes,
+                of(|learned| learned.before),
+                of(|learned| learned.after),
+                by_seed.join("; ")
+            ),
+        );
+    }
+    if !lines.is_empty() {
+        text.push_str(
+            "\nTask returns of the same held-out episodes before the first step and after the last, mean over seeds; \
+             their difference by seed, with the 95 % bootstrap interval over episodes, bold where it excludes 0:\n\n\
+             | method | setting | episodes | before | after | difference |\n|---|---|---:|---:|---:|---|\n",
+        );
+        text.push_str(&lines);
+    }
 }
 
 /// How far chosen pairs lie within a stage.

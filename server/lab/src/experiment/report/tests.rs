@@ -70,6 +70,7 @@ impl Told {
                 return_mean: 7.0,
                 return_std: 0.0,
                 reward_correlation: None,
+                returns: Vec::new(),
             })
         }));
         contents.push(Content::Finished(end));
@@ -90,6 +91,19 @@ impl Told {
     fn run(&self) -> RunResult {
         Results::parse("rows", &self.text()).unwrap().runs.remove(0)
     }
+}
+
+/// A run whose rows also tell the episodes' returns, before the first step and after the last.
+fn run_from(before: &[f64], after: &[f64]) -> RunResult {
+    let mut run = STAIR.run();
+    let first = Evaluation {
+        step: 0,
+        returns: before.to_vec(),
+        ..run.evaluations[0].clone()
+    };
+    run.evaluations.insert(0, first);
+    run.evaluations.last_mut().unwrap().returns = after.to_vec();
+    run
 }
 
 fn file(name: &str, text: String) -> RowFile {
@@ -122,6 +136,42 @@ fn three_seeds_each() -> String {
 
 fn close(found: f64, expected: f64) {
     assert!((found - expected).abs() < 1e-12, "{found} for {expected}");
+}
+
+#[test]
+fn learning_is_the_difference_of_the_same_episodes() {
+    let found = learned(&run_from(&[1.0, 2.0, 6.0], &[11.0, 12.0, 16.0])).unwrap();
+    close(found.before, 3.0);
+    close(found.after, 13.0);
+    close(found.difference.value, 10.0);
+    close(found.difference.interval.lo, 10.0); // though the episodes differ
+    assert_eq!(found.n_episodes, 3);
+
+    let unsure = learned(&run_from(&[1.0, 5.0, 3.0], &[5.0, 1.0, 4.0])).unwrap();
+    assert!(unsure.difference.interval.contains(0.0));
+
+    assert_eq!(learned(&STAIR.run()), None); // not tried before it began
+    assert_eq!(learned(&run_from(&[], &[])), None); // rows of an older program
+    assert_eq!(learned(&run_from(&[1.0], &[1.0, 2.0])), None);
+}
+
+#[test]
+fn a_report_tells_what_was_learned_and_is_sure_where_the_interval_says_so() {
+    let runs = Runs {
+        runs: vec![run_from(&[1.0, 2.0, 6.0], &[11.0, 12.0, 16.0])],
+        failed: Vec::new(),
+    };
+    let text = table::markdown(&runs);
+    assert!(
+        text.contains("| stair | – | 3 | 3 | 13 | **10 [10, 10]** |"),
+        "{text}"
+    );
+}
+
+#[test]
+fn a_score_leaves_out_what_was_before_the_first_step() {
+    let (with, without) = (score(&run_from(&[1.0], &[2.0])), score(&STAIR.run()));
+    assert_eq!(with, without);
 }
 
 #[test]
