@@ -12,7 +12,8 @@ use super::assembly::{
     self, Along, Motion, Mover, MovingPart, Part, Stops, capsule, cuboid, cylinder,
 };
 use super::metaworld::picture::{self, OBJECT_BODY};
-use super::metaworld::{Point, plus};
+use super::metaworld::{Judgement, Point, Readings, distance, plus, yes};
+use crate::reward::{Sigmoid, hamacher, tolerance};
 use crate::robots::tabletop;
 
 const FRAME: Material = Material::plain(0.36, 0.26, 0.27);
@@ -127,6 +128,38 @@ pub const POSE_SIZE: usize = 4;
 pub fn handle_at(root: Point, slide: f64, handle: Point) -> Point {
     plus(plus(root, [slide, 0.0, 0.0]), handle)
 }
+
+/// What a task asks of its point on the handle.
+#[derive(Debug, Clone, Copy)]
+pub struct Aim {
+    /// Where the point is.
+    pub handle: Point,
+    /// Where it should get to; only x counts.
+    pub goal: Point,
+    /// Distance from the goal at which being in place counts a tenth, metres.
+    pub in_place_margin: f64,
+    /// How nearness of the fingertips to the handle falls off.
+    pub reach: Sigmoid,
+}
+
+/// Reward and success of both tasks: `10 · hamacher(R, I)` with nearness `R` of the fingertips to the
+/// handle and nearness `I` of the handle to its goal.
+pub fn judge(readings: &Readings<WindowReading>, aim: &Aim) -> Judgement {
+    let to_goal = (aim.handle[0] - aim.goal[0]).abs();
+    let in_place = tolerance(to_goal, [0.0, 0.05], aim.in_place_margin, Sigmoid::LongTail);
+    let to_handle = distance(aim.handle, readings.tcp);
+    let reach_margin = (distance(readings.object.init_handle, readings.init_tcp) - 0.02).abs();
+    let reach = tolerance(to_handle, [0.0, 0.02], reach_margin, aim.reach);
+    Judgement {
+        reward: 10.0 * hamacher(reach, in_place),
+        success: to_goal <= 0.05,
+        near_object: yes(to_handle <= 0.05),
+        grasp_reward: reach,
+        in_place_reward: in_place,
+        obj_to_target: to_goal,
+    }
+}
+
 /// The picture of both tasks: frame and pane, and the goal.
 pub fn scene() -> Scene {
     let fixed = FIXED_PARTS.iter().map(|part| part.shape(OBJECT_BODY));

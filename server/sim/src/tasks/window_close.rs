@@ -36,11 +36,9 @@ use rapier3d::prelude::PhysicsWorld;
 use serde::{Deserialize, Serialize};
 
 use super::Task;
-use super::metaworld::{
-    self, Judgement, MOMENT_SIZE, Point, Readings, Setup, distance, picture, plus, yes,
-};
-use super::window::{self, Window, WindowReading, handle_at};
-use crate::reward::{Sigmoid, hamacher, tolerance};
+use super::metaworld::{self, Judgement, MOMENT_SIZE, Point, Readings, Setup, picture, plus};
+use super::window::{self, Aim, Window, WindowReading, handle_at};
+use crate::reward::Sigmoid;
 use crate::robots::sawyer_hand::HandRange;
 
 /// window-close, as the list of tasks shows it.
@@ -105,22 +103,13 @@ impl Setup for WindowClose {
             slide,
             init_handle,
         } = readings.object;
-        let handle = handle(root, slide);
-        let goal_x = goal(root)[0];
-        let to_goal = (handle[0] - goal_x).abs();
-        let in_place_margin = ((init_handle[0] - goal_x).abs() - 0.05).abs();
-        let in_place = tolerance(to_goal, [0.0, 0.05], in_place_margin, Sigmoid::LongTail);
-        let to_handle = distance(handle, readings.tcp);
-        let reach_margin = (distance(init_handle, readings.init_tcp) - 0.02).abs();
-        let reach = tolerance(to_handle, [0.0, 0.02], reach_margin, Sigmoid::Gaussian);
-        Judgement {
-            reward: 10.0 * hamacher(reach, in_place),
-            success: to_goal <= 0.05,
-            near_object: yes(to_handle <= 0.05),
-            grasp_reward: reach,
-            in_place_reward: in_place,
-            obj_to_target: to_goal,
-        }
+        let aim = Aim {
+            handle: handle(root, slide),
+            goal: goal(root),
+            in_place_margin: ((init_handle[0] - goal(root)[0]).abs() - 0.05).abs(),
+            reach: Sigmoid::Gaussian,
+        };
+        window::judge(readings, &aim)
     }
 
     fn pose(object: &WindowReading) -> Vec<f32> {
