@@ -3,7 +3,7 @@
 use domain::environment::{EnvError, Environment};
 use domain::random::{Rng, Stream};
 
-use crate::stepping::{n_cores, step_all};
+use crate::stepping::step_all;
 
 /// What `evaluate` saw.
 #[derive(Debug, Clone, PartialEq)]
@@ -110,7 +110,7 @@ pub fn evaluate(
             .enumerate()
             .filter(|(index, _)| is_running[*index]);
         let turns = turns.map(|(index, env)| (&mut **env as &mut dyn Environment, act(index)));
-        let steps = step_all(turns.collect(), n_cores())?;
+        let steps = step_all(turns.collect())?;
         for (index, step) in running.into_iter().zip(&steps) {
             let state = &mut observations[index * spec.observation_size..][..spec.observation_size];
             if index < N_KEPT {

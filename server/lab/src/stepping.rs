@@ -1,49 +1,29 @@
 //! One control step of many environments, on several threads.
 
-use std::panic::resume_unwind;
-use std::thread;
-
 use domain::environment::{EnvError, Environment, Step};
+use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 
 /// An environment and what to do in it, `[A]`.
 pub type Turn<'a> = (&'a mut dyn Environment, &'a [f32]);
 
-/// Threads that the machine runs at once.
-pub fn n_cores() -> usize {
-    thread::available_parallelism().map_or(1, usize::from)
-}
-
-/// Steps every environment once; steps come in the order of the turns. Environments share nothing,
-/// so the number of threads changes nothing but the time it takes.
-///
-/// * `n_threads` – at most one for each turn is used; 0 counts as 1
+/// Steps every environment once, on all threads of the present rayon pool; steps come in the order of
+/// the turns. Environments share nothing, so the number of threads changes nothing but the time it
+/// takes.
 ///
 /// # Errors
 /// Of the first turn that an environment refuses. The others have been taken.
-pub fn step_all(mut turns: Vec<Turn<'_>>, n_threads: usize) -> Result<Vec<Step>, EnvError> {
-    let share = turns.len().div_ceil(n_threads.max(1)).max(1);
-    let take = |turns: &mut [Turn<'_>]| -> Vec<Result<Step, EnvError>> {
-        turns
-            .iter_mut()
-            .map(|(env, action)| env.step(action))
-            .collect()
-    };
-    thread::scope(|scope| {
-        let mut shares = turns.chunks_mut(share);
-        let own = shares.next();
-        let others: Vec<_> = shares
-            .map(|share| scope.spawn(move || take(share)))
-            .collect();
-        let mut steps = own.map(take).unwrap_or_default();
-        for other in others {
-            steps.extend(other.join().unwrap_or_else(|panic| resume_unwind(panic)));
-        }
-        steps.into_iter().collect()
-    })
+pub fn step_all(turns: Vec<Turn<'_>>) -> Result<Vec<Step>, EnvError> {
+    let steps: Vec<Result<Step, EnvError>> = turns
+        .into_par_iter()
+        .map(|(env, action)| env.step(action))
+        .collect();
+    steps.into_iter().collect()
 }
 
 #[cfg(test)]
 mod tests {
+    use rayon::ThreadPoolBuilder;
+
     use super::*;
 
     fn environments(n: usize) -> Vec<Box<dyn Environment>> {
@@ -69,25 +49,21 @@ mod tests {
         let size = environments(1)[0].spec().action_size;
         let actions: Vec<Vec<f32>> = (0..n).map(|k| vec![k as f32 / 7.0 - 0.4; size]).collect();
         let observations = |n_threads: usize| {
-            let mut envs = environments(n);
-            let rounds =
-                (0..20).map(|_| step_all(turns(&mut envs, &actions), n_threads).expect("steps"));
-            rounds
-                .flatten()
-                .map(|step| step.observation)
-                .collect::<Vec<_>>()
+            let pool = ThreadPoolBuilder::new().num_threads(n_threads).build();
+            pool.expect("threads").install(|| {
+                let mut envs = environments(n);
+                let rounds = (0..20).map(|_| step_all(turns(&mut envs, &actions)).expect("steps"));
+                let steps = rounds.flatten().map(|step| step.observation);
+                steps.collect::<Vec<_>>()
+            })
         };
         let alone = observations(1);
         assert_eq!(alone.len(), 20 * n);
         assert_ne!(alone[0], alone[1], "environments that differ");
-        for n_threads in [0, 2, 3, 7, 50] {
+        for n_threads in [2, 3, 7, 50] {
             assert_eq!(observations(n_threads), alone, "{n_threads} threads");
         }
-        assert!(
-            step_all(Vec::new(), 2)
-                .expect("nothing to refuse")
-                .is_empty()
-        );
+        assert!(step_all(Vec::new()).expect("nothing to refuse").is_empty());
     }
 
     #[test]
@@ -97,7 +73,7 @@ mod tests {
         let mut actions = vec![vec![1.0; size]; 4];
         actions[1] = Vec::new();
         let before: Vec<_> = envs.iter().map(|env| env.pose()).collect();
-        assert!(step_all(turns(&mut envs, &actions), 2).is_err());
+        assert!(step_all(turns(&mut envs, &actions)).is_err());
         let has_moved: Vec<bool> = envs
             .iter()
             .zip(&before)

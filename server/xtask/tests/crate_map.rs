@@ -18,8 +18,9 @@ const MAY_KNOW: [(&str, &[&str]); 8] = [
 ];
 
 /// A heavy library and the only crates that may depend on it.
-const TAMED_BY: [(&str, &[&str]); 13] = [
+const TAMED_BY: [(&str, &[&str]); 14] = [
     ("rapier3d", &["sim"]),
+    ("rayon", &["lab"]),
     ("tch", &["learn"]),
     ("torch-sys", &["learn"]),
     ("wgpu", &["render"]),
