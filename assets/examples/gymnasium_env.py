@@ -11,6 +11,7 @@ plays one episode of random actions. In a program of your own:
 import json
 import subprocess
 import sys
+import tempfile
 
 import gymnasium
 import numpy as np
@@ -22,13 +23,20 @@ class StairEnv(gymnasium.Env):
     metadata = {"render_modes": []}
 
     def __init__(self, task, stair="stair"):
+        # A file, not a pipe, which would block stair once it is full.
+        self._errors = tempfile.TemporaryFile("w+")
         self._process = subprocess.Popen(
             [stair, "env", task],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
+            stderr=self._errors,
             text=True,
         )
-        self.stair_spec = self._ask({"spec": {}})
+        try:
+            self.stair_spec = self._ask({"spec": {}})
+        except BaseException:
+            self.close()
+            raise
         n_observed, n_acted = (
             self.stair_spec[size] for size in ("observation_size", "action_size")
         )
@@ -54,15 +62,22 @@ class StairEnv(gymnasium.Env):
         )
 
     def close(self):
-        self._process.stdin.close()
-        self._process.wait()
+        if self._process.returncode is None:
+            self._process.communicate()  # closes its input, which ends it, and waits
+        self._errors.close()
 
     def _ask(self, request):
-        self._process.stdin.write(json.dumps(request) + "\n")
-        self._process.stdin.flush()
+        try:
+            self._process.stdin.write(json.dumps(request) + "\n")
+            self._process.stdin.flush()
+        except BrokenPipeError:
+            pass  # it has ended, as the missing answer tells
         line = self._process.stdout.readline()
         if not line:
-            raise RuntimeError(f"stair ended with code {self._process.wait()}")
+            self._process.communicate()
+            self._errors.seek(0)
+            code, why = self._process.returncode, self._errors.read().strip()
+            raise RuntimeError(f"stair ended with code {code}: {why}")
         answer = json.loads(line)
         if "error" in answer:
             raise ValueError(answer["error"])
@@ -70,6 +85,8 @@ class StairEnv(gymnasium.Env):
 
 
 def main():
+    if len(sys.argv) not in (2, 3):
+        sys.exit(__doc__)
     env = StairEnv(*sys.argv[1:])
     env.action_space.seed(1)
     env.reset(seed=7)

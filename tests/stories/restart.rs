@@ -95,11 +95,7 @@ fn a_session_goes_on_where_it_was_after_the_server_was_stopped() {
     for lease in &second {
         answer(&server, &token, lease);
     }
-    let path = format!("/api/v1/runs/{run}");
-    wait_for("the run to finish", || {
-        server.ask("GET", &path, None)["state"]["kind"] == "finished"
-    });
-    assert_eq!(server.ask("GET", &path, None)["labels"], 12);
+    assert_eq!(server.finished(&run)["labels"], 12);
 }
 
 #[test]
@@ -121,8 +117,5 @@ fn a_run_that_was_training_when_the_server_was_killed_goes_on_by_itself() {
         server.ask("GET", &path, None)["labels"].as_u64() >= Some(5)
     });
     server.kill_and_restart();
-    wait_for("the run to finish", || {
-        server.ask("GET", &path, None)["state"]["kind"] == "finished"
-    });
-    assert_eq!(server.ask("GET", &path, None)["step"], 3000);
+    assert_eq!(server.finished(&run)["step"], 3000);
 }

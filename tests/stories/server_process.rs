@@ -97,6 +97,20 @@ impl ServerProcess {
         told
     }
 
+    /// Waits until a run is at its end, as long as it goes on; what there is to know of it then.
+    pub(crate) fn finished(&self, run: &str) -> Value {
+        let path = format!("/api/v1/runs/{run}");
+        wait_while_it_moves("the run to finish", || {
+            let run = self.ask("GET", &path, None);
+            if run["state"]["kind"] == "finished" {
+                Seen::There
+            } else {
+                Seen::At(run["step"].as_u64().expect("a number of steps"))
+            }
+        });
+        self.ask("GET", &path, None)
+    }
+
     /// Starts a run that programs answer; its id.
     pub(crate) fn create_run(
         &self,
@@ -178,9 +192,27 @@ pub(crate) fn ask(
 
 /// Looks again and again; a story that waits in vain fails with what it waited for.
 pub(crate) fn wait_for(what: &str, mut is_there: impl FnMut() -> bool) {
-    let began = Instant::now();
-    while !is_there() {
-        assert!(began.elapsed() < PATIENCE, "waited in vain for {what}");
+    wait_while_it_moves(what, || if is_there() { Seen::There } else { Seen::At(0) });
+}
+
+/// What a look at something awaited shows.
+pub(crate) enum Seen {
+    /// It is there.
+    There,
+    /// It is on its way, so far.
+    At(u64),
+}
+
+/// As [`wait_for`], but patience begins anew with every step on the way: a slow machine may take
+/// long for much.
+pub(crate) fn wait_while_it_moves(what: &str, mut look: impl FnMut() -> Seen) {
+    let (mut since, mut last) = (Instant::now(), None);
+    while let Seen::At(place) = look() {
+        if last.replace(place) != Some(place) {
+            since = Instant::now();
+        }
+        let waited = since.elapsed();
+        assert!(waited < PATIENCE, "waited in vain for {what}, at {place}");
         std::thread::sleep(Duration::from_millis(20)); // another process has to get there
     }
 }

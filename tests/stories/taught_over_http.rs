@@ -2,7 +2,7 @@
 
 use serde_json::json;
 
-use super::server_process::{ServerProcess, stair, wait_for};
+use super::server_process::{ServerProcess, stair};
 
 /// Share of held-out episodes in which an agent that learned its task succeeds.
 const LEARNED: f64 = 0.8;
@@ -33,11 +33,8 @@ fn success_rate_once_taught(server: &ServerProcess, seed: u64) -> f64 {
         .output();
     let taught = taught.expect("stair teach");
     assert!(taught.status.success(), "{taught:?}");
-    let path = format!("/api/v1/runs/{run}");
-    wait_for("the run to finish", || {
-        server.ask("GET", &path, None)["state"]["kind"] == "finished"
-    });
-    let rows = server.ask("GET", &format!("{path}/metrics"), None);
+    server.finished(&run);
+    let rows = server.ask("GET", &format!("/api/v1/runs/{run}/metrics"), None);
     let rows = rows.as_array().expect("a list of events");
     let last = rows.iter().rfind(|row| row["kind"] == "evaluation");
     let last = last.expect("an evaluation at the end");

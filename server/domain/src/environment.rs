@@ -71,8 +71,9 @@ pub trait Environment: Send {
     /// Advances one control step. Components outside [−1, 1] are clamped.
     ///
     /// # Errors
-    /// An action of the wrong length or not finite leaves the state unchanged; a simulation
-    /// that leaves the finite numbers ends the episode.
+    /// An action of the wrong length or not finite leaves the state unchanged. A simulation
+    /// that leaves the finite numbers ends the episode: every later step says the same, until a
+    /// reset or until a state from before is put back.
     fn step(&mut self, action: &[f32]) -> Result<Step, EnvError>;
 
     /// What it takes to draw the present state later without physics, `[pose_size]`.

@@ -389,6 +389,31 @@ mod tests {
         }
     }
 
+    /// ALGORITHMS.md 5 and the paper's tables of hyper-parameters.
+    #[test]
+    fn a_method_has_constants_of_its_own_for_some_tasks() {
+        let resolved = |method: &str, task: &str| {
+            let layers = Layers {
+                task: Some(task.into()),
+                method: Some(method.into()),
+                ..Layers::default()
+            };
+            RunConfig::resolve(&layers).unwrap()
+        };
+        let qpa = |task| resolved("qpa", task).queries.near_policy_episodes;
+        assert_eq!(
+            ["window-open", "door-open", "door-unlock"].map(qpa),
+            [10, 60, 30]
+        );
+        let rime = |task| resolved("rime", task).denoising.decay_epochs;
+        assert_eq!(["window-open", "quadruped-run"].map(rime), [600, 60]);
+        let mrn = |task| resolved("mrn", task).steering.every;
+        let tasks = ["door-open", "walker-run", "quadruped-walk", "cheetah-run"];
+        assert_eq!(tasks.map(mrn), [10_000, 1_000, 3_000, 5_000]);
+        let surf = |task| resolved("surf", task).semi_supervised.passes;
+        assert_eq!(["window-open", "cheetah-run"].map(surf), [20, 1_000]);
+    }
+
     #[test]
     fn a_later_layer_wins_and_the_saved_tree_reads_back() {
         let config =
@@ -460,9 +485,26 @@ mod tests {
             "agent.hidden=[1000000000]",
             "agent.batch=0",
             "agent.precision=f16",
+            "agent.discount=1.0",
+            "agent.critic_ema=0.0",
+            "agent.target_every=0",
+            "agent.actor_learning_rate=nan",
             "reward.members=0",
+            "reward.learning_rate=-1e-3",
+            "reward.label_margin=0.5",
+            "reward.max_epochs=0",
+            "temporal.block_episodes=0",
+            "temporal.update_every=0",
+            "temporal.discount=1.0",
+            "temporal.latent=7",
+            "temporal.max_gradient_norm=0.0",
+            "steering.every=0",
+            "exploration.neighbours=0",
+            "queries.coefficients.stage=nan",
         ] {
-            RunConfig::resolve(&layers(&[], &[bad])).unwrap_err();
+            let error = RunConfig::resolve(&layers(&[], &[bad])).unwrap_err();
+            let (key, _) = bad.split_once('=').unwrap_or((bad, ""));
+            assert!(error.to_string().contains(key), "{bad}: {error}");
         }
     }
 }

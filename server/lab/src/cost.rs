@@ -5,12 +5,13 @@ use std::time::Duration;
 
 use domain::environment::EnvSpec;
 use domain::schedule::FeedbackSchedule;
+use learn::reward::RewardLearner;
 
 use crate::config::RunConfig;
 use crate::method;
 
 /// Share of the rate of plain products that whole updates reach (see learn's PERFORMANCE.md:
-/// 0.65 to 0.86), less what a run does beside them.
+/// 0.61 to 0.90), less what a run does beside them.
 const SHARE: f64 = 0.55;
 /// Acting, physics and storing, seconds a control step.
 const STEP_S: f64 = 0.000_15;
@@ -67,8 +68,10 @@ pub fn gigaflop_per_second() -> f64 {
 pub fn gigaflop(config: &RunConfig, spec: &EnvSpec) -> f64 {
     let t = &config.training;
     let updates = t.total_steps.saturating_sub(t.seed_steps) as f64 * t.updates_per_step;
-    let asks = method::find(&config.method).is_ok_and(|m| (m.build)(config).sampler.is_some());
-    let fits = if asks { fits(config, spec) } else { 0.0 };
+    let method = method::build(config).ok().filter(|m| m.sampler.is_some());
+    let fits = method.map_or(0.0, |method| {
+        fits(config, spec, &*(method.reward_learner)(config))
+    });
     (updates * sac_update(config, spec) + fits) / 1e9
 }
 
@@ -84,23 +87,27 @@ fn sac_update(config: &RunConfig, spec: &EnvSpec) -> f64 {
     2.0 * config.agent.batch as f64 * (12.0 * critic + 4.0 * actor)
 }
 
-/// Of all fits of the reward ensemble, each to all answers so far, and of relabelling after each.
-fn fits(config: &RunConfig, spec: &EnvSpec) -> f64 {
-    let reward = &config.reward;
+/// Of the ensemble's warm start, of all its fits, each to all answers so far, and of relabelling after
+/// each.
+fn fits(config: &RunConfig, spec: &EnvSpec, learner: &dyn RewardLearner) -> f64 {
+    let (reward, t) = (&config.reward, &config.training);
     let row = 2.0
         * reward.members as f64
         * weights(spec.observation_size + spec.action_size, &reward.hidden, 1);
     let rows_per_label = 2.0 * f64::from(config.segment_len(spec));
     let feedback: &FeedbackSchedule = &config.feedback;
-    let (mut total, mut labels) = (0.0, 0);
+    let n_exploring = feedback.first_step.saturating_sub(t.seed_steps) as f64 * t.updates_per_step;
+    let warm_rows = n_exploring * f64::from(learner.warm_start_steps()) * config.agent.batch as f64;
+    let mut total = 3.0 * row * warm_rows;
+    let mut labels = 0;
     for session in 0.. {
         let step = feedback.step_of(session);
-        if step >= config.training.total_steps || labels >= feedback.budget {
+        if step >= t.total_steps || labels >= feedback.budget {
             break;
         }
         labels += feedback.session_size(labels);
-        let passes = f64::from(reward.max_epochs) * 3.0; // there, and twice as much back
-        total += row * (passes * rows_per_label * f64::from(labels) + step as f64);
+        let ways = learner.ways_through(reward.max_epochs);
+        total += row * (ways * rows_per_label * f64::from(labels) + step as f64);
     }
     total
 }
@@ -138,6 +145,20 @@ mod tests {
         let (config, spec) = resolved("sac", "");
         let gigaflop = sac_update(&config, &spec) / 1e9;
         assert!((gigaflop - 2.30).abs() < 0.05, "{gigaflop}");
+    }
+
+    #[test]
+    fn a_method_that_passes_over_more_pairs_or_warms_up_costs_more() {
+        let cost = |method| {
+            let (config, spec) = resolved(method, "");
+            gigaflop(&config, &spec)
+        };
+        assert!(
+            cost("surf") > 1.2 * cost("pebble"),
+            "20 · 19 ways instead of 10 · 3"
+        );
+        assert!(cost("rime") > cost("pebble"));
+        assert!(cost("sac") < cost("pebble"));
     }
 
     #[test]

@@ -119,9 +119,9 @@ pub struct SessionOffered {
     pub disagreement_chosen: Option<f64>,
     /// Mean disagreement of all candidates.
     pub disagreement_pool: Option<f64>,
-    /// Mean stage gap of the chosen queries, nats.
+    /// Mean stage gap of the chosen queries: nats where it is a temporal distance, else in [0, 1].
     pub stage_gap_chosen: Option<f64>,
-    /// Mean stage gap of all candidates, nats.
+    /// Mean stage gap of all candidates, in the same unit.
     pub stage_gap_pool: Option<f64>,
     /// Share of chosen queries whose four end states are in one true stage.
     pub same_stage_chosen: Option<f64>,
@@ -142,6 +142,11 @@ pub struct SessionClosed {
     pub loss: f64,
     /// Mean share of answers that the members agree with, last epoch.
     pub accuracy: f64,
+    /// Share of this session's answers that the task reward gives too, pairs of equal reward and
+    /// answers without a preference left out: how often a scripted teacher really erred, and how
+    /// near people are to the task reward. `None` where no pair was left.
+    #[serde(default)]
+    pub oracle_agreement: Option<f64>,
 }
 
 /// The policy on held-out episodes, mean action.

@@ -292,6 +292,7 @@ impl Run {
             epochs: fit.n_epochs,
             loss: f64::from(fit.loss),
             accuracy: f64::from(fit.accuracy),
+            oracle_agreement: session.oracle_agreement(&self.preferences, &self.replay),
         };
         self.say(Event::SessionClosed(closed), events)
     }
@@ -412,3 +413,6 @@ impl Run {
         labeled.split_off(labeled.len().saturating_sub(n))
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,9 +1,11 @@
 //! One round of asking: what was chosen, what replaces a skipped query, when it is complete.
 
+use domain::answer::Preference;
 use domain::environment::TaskReward;
 use domain::query::{OfferedQuery, Query, QueryKey};
 use domain::random::{Rng, Stream};
 use domain::sampler::{Beliefs, QuerySampler};
+use domain::teacher::{Judge as _, Oracle};
 use learn::replay::Replay;
 use serde::{Deserialize, Serialize};
 
@@ -148,6 +150,25 @@ impl Session {
         let is_open = |p: &Planned| preferences.state(p.key) == Some(AnswerState::Open);
         f64::from(n_received) >= f64::from(n_needed) * sufficient
             || !self.planned.iter().any(is_open)
+    }
+
+    /// Share of its answers that an unerring teacher would have given, among those that prefer one
+    /// segment of a pair that differs in task reward.
+    pub(crate) fn oracle_agreement(
+        &self,
+        preferences: &Preferences,
+        replay: &Replay,
+    ) -> Option<f64> {
+        let agrees = |planned: &Planned| {
+            let Some(AnswerState::Preferred(own @ Preference::Prefer(_))) =
+                preferences.state(planned.key)
+            else {
+                return None;
+            };
+            let right = Oracle.judge(&planned.offer(replay))?;
+            (right != Preference::Equal).then_some(f32::from(u8::from(own == right)))
+        };
+        mean(&self.planned.iter().filter_map(agrees).collect::<Vec<_>>())
     }
 
     /// What choosing did: the chosen queries against all candidates.

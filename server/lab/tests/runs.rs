@@ -12,7 +12,9 @@ use std::path::PathBuf;
 use std::sync::mpsc::channel;
 
 use domain::query::{OfferedQuery, QueryKey};
-use domain::teacher::{Answered, Oracle, Scripted, Teacher, TeacherError, TeacherSettings, judge};
+use domain::teacher::{
+    Answered, Judge, Oracle, Scripted, Teacher, TeacherError, TeacherSettings, judge,
+};
 use lab::config::{Layers, RunConfig};
 use lab::message::{Activity, Command, Event};
 use lab::policy::TrainedPolicy;
@@ -232,6 +234,27 @@ fn a_skipped_query_is_replaced_and_uses_no_budget() {
     let (outcome, _) = drive(&mut run, &mut teacher);
     assert!(teacher.skipped.len() >= 4, "{:?}", teacher.skipped);
     assert_eq!(finished(outcome).labels, 10);
+}
+
+#[test]
+fn a_session_tells_how_often_its_answers_were_those_of_the_task_reward() {
+    let agreements = |name: &str, judge: Box<dyn Judge>| -> Vec<f64> {
+        let folder = Folder::new(name);
+        let mut run = Run::start(short(), &folder.0).unwrap();
+        let (_, events) = drive(&mut run, &mut Scripted::new(judge, 0));
+        let of_session = |event: Event| match event {
+            Event::SessionClosed(session) => session.oracle_agreement,
+            _ => None,
+        };
+        events.into_iter().filter_map(of_session).collect()
+    };
+    assert_eq!(agreements("agreeing", Box::new(Oracle)), [1.0, 1.0]);
+    let always_wrong = TeacherSettings {
+        mistake: 1.0,
+        ..TeacherSettings::default()
+    };
+    let judge = judge("mistaken", 1, &always_wrong).unwrap();
+    assert_eq!(agreements("disagreeing", judge), [0.0, 0.0]);
 }
 
 /// Never answers.

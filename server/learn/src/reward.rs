@@ -55,7 +55,7 @@ pub struct RewardFit {
 pub struct Estimate {
     /// Mean over members, in (−1, 1) unless it is normalised, `[n]`.
     pub rewards: Vec<f32>,
-    /// std over members (their number in the denominator), `[n]`.
+    /// std over members (their number in the denominator) of what is in `rewards`, `[n]`.
     pub disagreements: Vec<f32>,
 }
 
@@ -107,6 +107,15 @@ impl Scale {
         if self != Self::NONE {
             for reward in rewards {
                 *reward = (self.factor * (f64::from(*reward) - self.offset)) as f32;
+            }
+        }
+    }
+
+    /// The same to a spread, which has no level.
+    fn stretch(self, spreads: &mut [f32]) {
+        if self != Self::NONE {
+            for spread in spreads {
+                *spread = (self.factor * f64::from(*spread)) as f32;
             }
         }
     }
@@ -189,6 +198,7 @@ impl RewardEnsemble {
         for rows in rows.chunks(CHUNK_ROWS * self.columns as usize) {
             let mut own = self.moments(rows);
             self.scale.apply(&mut own.rewards);
+            self.scale.stretch(&mut own.disagreements);
             estimate.rewards.extend(own.rewards);
             estimate.disagreements.extend(own.disagreements);
         }
@@ -227,6 +237,9 @@ impl RewardEnsemble {
             };
             for lane in 0..replay.n_lanes() {
                 self.scale.apply(replay.learned_rewards_mut(lane));
+                if replay.keeps_disagreement() {
+                    self.scale.stretch(replay.disagreements_mut(lane));
+                }
             }
         }
     }

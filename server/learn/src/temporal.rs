@@ -17,7 +17,8 @@ mod pairwise;
 
 use pairwise::Pairwise;
 
-/// Settings of the temporal distance. Defaults: the released settings for MetaWorld.
+/// Settings of the temporal distance. Defaults: the released settings for MetaWorld, except for
+/// [`loss`](Self::loss).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct TemporalConfig {
@@ -40,7 +41,8 @@ pub struct TemporalConfig {
     pub discount: f64,
     /// The gradient's norm is scaled down to this.
     pub max_gradient_norm: f64,
-    /// Which softmax is trained.
+    /// Which softmax is trained. Symmetric, as the paper says; the released code trains the forward
+    /// one alone.
     pub loss: ContrastiveLoss,
 }
 

@@ -6,6 +6,7 @@
 //! steps is nobody's business but the task's, so tasks share physics but no behaviour.
 
 pub mod articulated;
+pub mod course;
 pub mod expert;
 pub mod golden;
 pub mod reward;

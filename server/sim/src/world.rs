@@ -5,7 +5,12 @@ use rapier3d::prelude::{PhysicsWorld, Vector};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 /// Snapshots fit this program and this physics engine only: rapier's state has no stable form.
-const SNAPSHOT_VERSION: &str = concat!("stair ", env!("CARGO_PKG_VERSION"), ", rapier3d 0.36.1");
+/// `states 2`: since episodes remember that they are lost.
+const SNAPSHOT_VERSION: &str = concat!(
+    "stair ",
+    env!("CARGO_PKG_VERSION"),
+    ", states 2, rapier3d 0.36.1"
+);
 
 /// How a world's time passes.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -151,6 +151,8 @@ pub(super) fn png(image: &RgbaImage) -> anyhow::Result<Vec<u8>> {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+
     use super::*;
 
     #[test]
@@ -166,5 +168,40 @@ mod tests {
         let scene = (sim::tasks::tasks()[0].scene)();
         let error = camera(&scene, Some("nowhere")).err().map(|e| e.to_string());
         assert!(error.is_some_and(|e| e.contains(&scene.cameras[0].name)));
+    }
+
+    /// Each camera of each task: more than a background, and another picture once the body moved.
+    #[test]
+    fn every_task_draws_something_that_changes_with_its_pose() {
+        let renderer = Renderer::new().expect("a driver");
+        for task in sim::tasks::tasks() {
+            let scene = (task.scene)();
+            let policy = Policy::open(task, "random", 0.0, 1).expect("chance plays every task");
+            let frames = episode(task, &policy, 1, Some(25)).expect("a sound episode");
+            let ends = [frames[0].clone(), frames[24].clone()];
+            for camera in &scene.cameras {
+                let images = renderer
+                    .draw(&scene, &ends, (160, 120), camera)
+                    .expect("pictures");
+                let colors = |image: &RgbaImage| -> BTreeSet<[u8; 4]> {
+                    image.pixels().map(|pixel| pixel.0).collect()
+                };
+                let n_colors = colors(&images[0]).len();
+                assert!(
+                    n_colors > 100,
+                    "{}, {}: {n_colors} colours",
+                    task.name,
+                    camera.name
+                );
+                let pixels = images[0].pixels().zip(images[1].pixels());
+                let n_changed = pixels.filter(|(before, after)| before != after).count();
+                assert!(
+                    n_changed > 50,
+                    "{}, {}: {n_changed} pixels",
+                    task.name,
+                    camera.name
+                );
+            }
+        }
     }
 }

@@ -30,7 +30,7 @@ pub struct Args {
     /// The method; `stair tasks` lists them
     #[arg(long)]
     method: Option<String>,
-    /// A preset on top of the task's and the method's own: quick
+    /// A preset on top of the task's and the method's own: quick, paper_table
     #[arg(long)]
     preset: Vec<String>,
     /// A TOML file with settings
@@ -42,7 +42,7 @@ pub struct Args {
     /// Of every random stream
     #[arg(long)]
     seed: Option<u64>,
-    /// Who answers: oracle, mistaken, coin
+    /// Who answers: oracle, mistaken, inconsistent, myopic, noisy, equal, skip, coin
     #[arg(long, default_value = "oracle")]
     teacher: String,
     /// Answers in all

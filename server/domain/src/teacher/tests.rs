@@ -104,6 +104,11 @@ fn thresholds_follow_the_agent_and_the_slip_squares_them_from_the_second_session
         ..poor
     };
     assert_eq!(teacher("skip").judge(&unknown), FIRST);
+    let beginner = OfferedQuery {
+        typical_reward: Some(TaskReward(0.0)),
+        ..query(0, &[0.0, 0.0], &[0.0, 0.0])
+    };
+    assert!(teacher("skip").judge(&beginner).is_some());
 }
 
 /// Where myopia and the oracle differ: half the answers are myopic, a fifth of the rest flipped,

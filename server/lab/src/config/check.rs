@@ -1,17 +1,69 @@
 //! Ranges of the settings.
 
+use std::ops::RangeBounds;
+
 use domain::sampler::{SAMPLERS, sampler};
 
 use super::{ConfigError, RunConfig, find_task, unknown};
 use crate::method;
 
-/// A value that is not what it must be.
-fn out(key: &'static str, value: &dyn ToString, must_be: &'static str) -> Result<(), ConfigError> {
+/// Says what a value must be where it is not so.
+fn require(
+    holds: bool,
+    key: &'static str,
+    value: &dyn ToString,
+    must_be: &'static str,
+) -> Result<(), ConfigError> {
+    if holds {
+        return Ok(());
+    }
     Err(ConfigError::OutOfRange {
         key,
         value: value.to_string(),
         must_be,
     })
+}
+
+/// Values of one kind; the first one out of the range is refused.
+fn all_within<T: PartialOrd + ToString>(
+    values: impl IntoIterator<Item = (&'static str, T)>,
+    range: &impl RangeBounds<T>,
+    must_be: &'static str,
+) -> Result<(), ConfigError> {
+    for (key, value) in values {
+        require(range.contains(&value), key, &value, must_be)?;
+    }
+    Ok(())
+}
+
+fn not_zero(values: impl IntoIterator<Item = (&'static str, u64)>) -> Result<(), ConfigError> {
+    all_within(values, &(1..), "at least 1")
+}
+
+/// Finite and above 0.
+fn positive(values: impl IntoIterator<Item = (&'static str, f64)>) -> Result<(), ConfigError> {
+    all_within(values, &(f64::MIN_POSITIVE..=f64::MAX), "a number above 0")
+}
+
+fn not_negative(values: impl IntoIterator<Item = (&'static str, f64)>) -> Result<(), ConfigError> {
+    all_within(values, &(0.0..=f64::MAX), "a number from 0 on")
+}
+
+/// In [0, 1].
+fn shares(values: impl IntoIterator<Item = (&'static str, f64)>) -> Result<(), ConfigError> {
+    all_within(values, &(0.0..=1.0), "from 0 to 1")
+}
+
+/// In (0, 1].
+fn shares_above_0(
+    values: impl IntoIterator<Item = (&'static str, f64)>,
+) -> Result<(), ConfigError> {
+    all_within(values, &(f64::MIN_POSITIVE..=1.0), "above 0, at most 1")
+}
+
+/// In [0, 1): such a number's powers die out.
+fn discounts(values: impl IntoIterator<Item = (&'static str, f64)>) -> Result<(), ConfigError> {
+    all_within(values, &(0.0..1.0), "from 0 to below 1")
 }
 
 impl RunConfig {
@@ -20,197 +72,182 @@ impl RunConfig {
     /// # Errors
     /// The first value that is outside its range.
     pub(super) fn check(&self) -> Result<(), ConfigError> {
-        let task = find_task(&self.task)?;
+        find_task(&self.task)?;
         method::find(&self.method)?;
-        let (t, q, f) = (&self.training, &self.queries, &self.feedback);
-        if !(1..=256).contains(&self.environment.n_envs) {
-            return out(
-                "environment.n_envs",
-                &self.environment.n_envs,
-                "from 1 to 256",
-            );
-        }
-        if !(t.updates_per_step >= 0.0 && t.updates_per_step <= 64.0) {
-            return out(
-                "training.updates_per_step",
-                &t.updates_per_step,
-                "from 0 to 64",
-            );
-        }
-        if !(t.task_reward_scale > 0.0 && t.task_reward_scale.is_finite()) {
-            return out(
-                "training.task_reward_scale",
-                &t.task_reward_scale,
-                "above 0",
-            );
-        }
-        if t.total_steps == 0 {
-            return out("training.total_steps", &0, "at least 1");
-        }
-        if f.first_step <= t.seed_steps {
-            return out(
-                "feedback.first_step",
-                &f.first_step,
-                "above training.seed_steps",
-            );
-        }
-        if f.queries_per_session == 0 {
-            return out("feedback.queries_per_session", &0, "at least 1");
-        }
-        if f.every == 0 {
-            return out("feedback.every", &0, "at least 1 step");
-        }
-        if !(0.0..=1.0).contains(&q.same_stage_fraction) {
-            return out(
-                "queries.same_stage_fraction",
-                &q.same_stage_fraction,
-                "from 0 to 1",
-            );
-        }
-        if !(q.sufficient_fraction > 0.0 && q.sufficient_fraction <= 1.0) {
-            return out(
-                "queries.sufficient_fraction",
-                &q.sufficient_fraction,
-                "above 0, at most 1",
-            );
-        }
-        if q.candidates_per_query == 0 {
-            return out("queries.candidates_per_query", &0, "at least 1");
-        }
-        if q.near_policy_episodes == 0 {
-            return out("queries.near_policy_episodes", &0, "at least 1");
+        let n_envs = [("environment.n_envs", self.environment.n_envs)];
+        all_within(n_envs, &(1..=256), "from 1 to 256")?;
+        self.check_training()?;
+        self.check_queries()?;
+        self.check_agent()?;
+        self.check_reward()?;
+        self.check_temporal()?;
+        self.check_teacher()?;
+        self.check_methods()?;
+        self.check_sizes()
+    }
+
+    fn check_training(&self) -> Result<(), ConfigError> {
+        let (t, f) = (&self.training, &self.feedback);
+        let updates = [("training.updates_per_step", t.updates_per_step)];
+        all_within(updates, &(0.0..=64.0), "from 0 to 64")?;
+        let scale = f64::from(t.task_reward_scale);
+        positive([("training.task_reward_scale", scale)])?;
+        not_zero([
+            ("training.total_steps", t.total_steps),
+            ("feedback.every", f.every),
+            ("evaluation.episodes", u64::from(self.evaluation.episodes)),
+            ("exploration.neighbours", self.exploration.neighbours as u64),
+        ])?;
+        require(
+            f.first_step > t.seed_steps,
+            "feedback.first_step",
+            &f.first_step,
+            "above training.seed_steps",
+        )
+    }
+
+    fn check_queries(&self) -> Result<(), ConfigError> {
+        let q = &self.queries;
+        let per_session = self.feedback.queries_per_session;
+        not_zero([
+            ("feedback.queries_per_session", u64::from(per_session)),
+            (
+                "queries.candidates_per_query",
+                u64::from(q.candidates_per_query),
+            ),
+            (
+                "queries.near_policy_episodes",
+                q.near_policy_episodes as u64,
+            ),
+            ("queries.newest_episodes", q.newest_episodes as u64),
+        ])?;
+        shares([("queries.same_stage_fraction", q.same_stage_fraction)])?;
+        shares_above_0([("queries.sufficient_fraction", q.sufficient_fraction)])?;
+        for (key, weight) in [
+            ("queries.coefficients.stage", q.coefficients.stage),
+            ("queries.coefficients.state", q.coefficients.state),
+        ] {
+            require(weight.is_finite(), key, &weight, "a number")?;
         }
         if !q.sampler.is_empty() && sampler(&q.sampler, &q.sampler_settings()).is_none() {
             let known = SAMPLERS.iter().map(|(name, _)| *name);
             return Err(unknown("sampler", &q.sampler, known));
         }
-        self.check_agent()?;
-        self.check_teacher()?;
-        self.check_methods()?;
-        if q.newest_episodes == 0 {
-            return out("queries.newest_episodes", &0, "at least 1");
-        }
-        if self.evaluation.episodes == 0 {
-            return out("evaluation.episodes", &0, "at least 1");
-        }
-        if q.segment_len > (task.spec)().episode_len {
-            return out(
-                "queries.segment_len",
-                &q.segment_len,
-                "at most an episode's length",
-            );
-        }
-        self.check_sizes()
+        require(
+            q.segment_len <= (find_task(&self.task)?.spec)().episode_len,
+            "queries.segment_len",
+            &q.segment_len,
+            "at most an episode's length",
+        )
     }
 
     fn check_agent(&self) -> Result<(), ConfigError> {
         let agent = &self.agent;
-        if !(0.0..=1.0).contains(&agent.actor_ema) {
-            return out("agent.actor_ema", &agent.actor_ema, "from 0 to 1");
-        }
-        if !(agent.final_rate > 0.0 && agent.final_rate <= 1.0) {
-            let must_be = "above 0, at most 1";
-            return out("agent.final_rate", &agent.final_rate, must_be);
-        }
-        if !agent.final_entropy.is_finite() || agent.final_entropy > 0.0 {
-            return out("agent.final_entropy", &agent.final_entropy, "at most 0");
-        }
-        Ok(())
+        positive([
+            ("agent.actor_learning_rate", agent.actor_learning_rate),
+            ("agent.critic_learning_rate", agent.critic_learning_rate),
+            ("agent.initial_temperature", agent.initial_temperature),
+        ])?;
+        not_negative([("agent.alpha_learning_rate", agent.alpha_learning_rate)])?;
+        discounts([("agent.discount", agent.discount)])?;
+        shares([("agent.actor_ema", agent.actor_ema)])?;
+        shares_above_0([
+            ("agent.critic_ema", agent.critic_ema),
+            ("agent.final_rate", agent.final_rate),
+        ])?;
+        not_zero([("agent.target_every", agent.target_every)])?;
+        require(
+            agent.final_entropy.is_finite() && agent.final_entropy <= 0.0,
+            "agent.final_entropy",
+            &agent.final_entropy,
+            "at most 0",
+        )
+    }
+
+    fn check_reward(&self) -> Result<(), ConfigError> {
+        let r = &self.reward;
+        all_within([("reward.members", r.members)], &(1..=64), "from 1 to 64")?;
+        positive([
+            ("reward.learning_rate", r.learning_rate),
+            ("reward.temperature", r.temperature),
+        ])?;
+        not_zero([("reward.max_epochs", u64::from(r.max_epochs))])?;
+        not_negative([("reward.normalized_std", r.normalized_std)])?;
+        shares([("reward.stop_accuracy", f64::from(r.stop_accuracy))])?;
+        let margin = [("reward.label_margin", r.label_margin)];
+        all_within(margin, &(0.0..0.5), "from 0 to below 0.5")
+    }
+
+    fn check_temporal(&self) -> Result<(), ConfigError> {
+        let t = &self.temporal;
+        require(
+            (2..=65_536).contains(&t.latent) && t.latent % 2 == 0,
+            "temporal.latent",
+            &t.latent,
+            "even, from 2 to 65536: half of it is symmetric",
+        )?;
+        not_zero([
+            ("temporal.block_episodes", t.block_episodes as u64),
+            ("temporal.update_every", t.update_every),
+        ])?;
+        positive([
+            ("temporal.learning_rate", t.learning_rate),
+            ("temporal.max_gradient_norm", t.max_gradient_norm),
+        ])?;
+        discounts([("temporal.discount", t.discount)])
     }
 
     /// Of networks and of what they are given at once.
     fn check_sizes(&self) -> Result<(), ConfigError> {
-        let sizes = [
+        for (key, sizes) in [
             ("agent.hidden", &self.agent.hidden),
             ("reward.hidden", &self.reward.hidden),
             ("temporal.hidden", &self.temporal.hidden),
-        ];
-        for (key, sizes) in sizes {
-            if sizes.len() > 16 || sizes.iter().any(|n| !(1..=65_536).contains(n)) {
-                let must_be = "at most 16 layers of 1 to 65536";
-                return out(key, &format!("{sizes:?}"), must_be);
-            }
+        ] {
+            let is_right = |n: &i64| (1..=65_536).contains(n);
+            let must_be = "at most 16 layers of 1 to 65536";
+            let holds = sizes.len() <= 16 && sizes.iter().all(is_right);
+            require(holds, key, &format!("{sizes:?}"), must_be)?;
         }
         let batches = [
             ("agent.batch", self.agent.batch),
             ("reward.batch", self.reward.batch),
             ("temporal.batch", self.temporal.batch),
         ];
-        for (key, batch) in batches {
-            if !(1..=1_000_000).contains(&batch) {
-                return out(key, &batch, "from 1 to 1000000");
-            }
-        }
-        let std = self.reward.normalized_std;
-        if !(std >= 0.0 && std.is_finite()) {
-            return out("reward.normalized_std", &std, "a number from 0 on");
-        }
-        let temperature = self.reward.temperature;
-        if !(temperature > 0.0 && temperature.is_finite()) {
-            return out("reward.temperature", &temperature, "a number above 0");
-        }
-        if !(1..=64).contains(&self.reward.members) {
-            return out("reward.members", &self.reward.members, "from 1 to 64");
-        }
-        if !(1..=65_536).contains(&self.temporal.latent) {
-            return out("temporal.latent", &self.temporal.latent, "from 1 to 65536");
-        }
-        Ok(())
+        all_within(batches, &(1..=1_000_000), "from 1 to 1000000")
     }
 
     /// What single methods read.
     fn check_methods(&self) -> Result<(), ConfigError> {
         let (b, d, s) = (&self.bonus, &self.denoising, &self.semi_supervised);
-        let shares = [
-            ("bonus.decay", b.decay, 0.0..1.0),
-            ("denoising.flip_below", d.flip_below, 1e-12..0.5),
-            ("semi_supervised.certainty", s.certainty, 0.5..1.0),
-        ];
-        for (key, value, range) in shares {
-            if !range.contains(&value) {
-                let must_be = "a share: bonus.decay in [0, 1), flip_below in (0, 0.5), \
-                               certainty in [0.5, 1)";
-                return out(key, &value, must_be);
-            }
-        }
-        let weights = [
+        discounts([("bonus.decay", b.decay)])?;
+        let flip = [("denoising.flip_below", d.flip_below)];
+        all_within(flip, &(1e-12..0.5), "above 0, below 0.5")?;
+        let certainty = [("semi_supervised.certainty", s.certainty)];
+        all_within(certainty, &(0.5..1.0), "from 0.5 to below 1")?;
+        not_negative([
             ("bonus.initial", b.initial),
             ("steering.weight", self.steering.weight),
             ("denoising.slack", d.slack),
             ("denoising.doubt", d.doubt),
             ("denoising.least_doubt", d.least_doubt),
             ("semi_supervised.weight", s.weight),
-        ];
-        for (key, value) in weights {
-            if !(value >= 0.0 && value.is_finite()) {
-                return out(key, &value, "a number from 0 on");
-            }
-        }
-        if s.passes == 0 {
-            return out("semi_supervised.passes", &0, "at least 1");
-        }
-        Ok(())
+        ])?;
+        not_zero([
+            ("semi_supervised.passes", u64::from(s.passes)),
+            ("steering.every", self.steering.every),
+        ])
     }
 
     fn check_teacher(&self) -> Result<(), ConfigError> {
         let t = &self.teacher;
-        let shares = [
+        shares([
             ("teacher.mistake", t.mistake),
             ("teacher.inconsistent_mistake", t.inconsistent_mistake),
             ("teacher.equal", t.equal),
             ("teacher.skip", t.skip),
-        ];
-        for (key, value) in shares {
-            if !(0.0..=1.0).contains(&value) {
-                return out(key, &value, "from 0 to 1");
-            }
-        }
-        if !(t.discount > 0.0 && t.discount <= 1.0) {
-            return out("teacher.discount", &t.discount, "above 0, at most 1");
-        }
-        if !(t.rationality > 0.0 && t.rationality.is_finite()) {
-            return out("teacher.rationality", &t.rationality, "a number above 0");
-        }
-        Ok(())
+        ])?;
+        shares_above_0([("teacher.discount", t.discount)])?;
+        positive([("teacher.rationality", t.rationality)])
     }
 }

@@ -5,8 +5,9 @@ use toml::{Table, Value};
 use super::layers::{invalid, merge};
 use super::{ConfigError, RunConfig, unknown};
 
-/// `(name, task or "", text)` of every preset. A method's holds for any task, `task` and `quick`
-/// have a text for each; where there are both, the task's own comes on top.
+/// `(name, task or "", text)` of every preset. A method has one for any task and may have more for
+/// single ones, `task` and `quick` have one for each; where there are both, the task's own comes on
+/// top.
 ///
 /// The list is made at build time: a preset is a file in `assets/presets`, or in the folder
 /// there of its kind, and nothing else.

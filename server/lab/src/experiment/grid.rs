@@ -61,7 +61,7 @@ pub struct RunKey {
 impl RunKey {
     /// A name for its folder and for people: `go-fetch-return.stair.oracle.80-labels.3`.
     pub fn name(&self) -> String {
-        let setting: String = self.setting.chars().map(in_a_name).collect();
+        let setting = folder_part(&self.setting);
         let parts = [&self.task, &self.method, &self.teacher, &setting];
         let parts: Vec<&str> = parts.into_iter().map(String::as_str).collect();
         let named = parts.into_iter().filter(|part| !part.is_empty());
@@ -84,6 +84,11 @@ impl RunKey {
             &self.teacher
         }
     }
+}
+
+/// A setting's name as folders have it.
+fn folder_part(setting: &str) -> String {
+    setting.chars().map(in_a_name).collect()
 }
 
 fn in_a_name(c: char) -> char {
@@ -296,10 +301,18 @@ impl Reader<'_> {
         for (n, setting) in all.iter().enumerate() {
             let name = setting.name.get_ref();
             let is_twice = all[..n].iter().any(|other| other.name.get_ref() == name);
+            let is_alike =
+                |other: &&SettingEntry| folder_part(other.name.get_ref()) == folder_part(name);
             let is_wrong =
                 name.is_empty() || name.chars().any(|c| c.is_control() || c == '/' || c == '|');
             let reason = if is_twice {
                 format!("the setting '{name}' is there twice")
+            } else if let Some(other) = all[..n].iter().find(is_alike) {
+                let other = other.name.get_ref();
+                format!(
+                    "the settings '{other}' and '{name}' would share their runs' folders; \
+                     tell them apart by more than punctuation"
+                )
             } else if is_wrong {
                 "a setting needs a name without '/' and '|'".to_owned()
             } else {

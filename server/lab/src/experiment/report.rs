@@ -6,9 +6,10 @@ use std::collections::BTreeSet;
 
 use super::Artifact;
 use super::grid::RunKey;
-use super::results::{Results, RunResult};
+use super::results::{Content, Results, Row, RunResult};
 use crate::config::ConfigError;
 use crate::figure::{self, CurveRow, FigureError, Request, Source};
+use crate::message::SessionOffered;
 
 mod comparable;
 mod score;
@@ -152,7 +153,7 @@ pub fn make(files: &[RowFile], may_mix: bool) -> Result<Vec<Artifact>, ReportErr
             artifacts.extend(curves(names[1], &by_budget, y, "labels")?);
         }
     }
-    artifacts.extend(stage_gaps(files)?);
+    artifacts.extend(stage_gaps(&runs)?);
     Ok(artifacts)
 }
 
@@ -225,14 +226,18 @@ fn budget_rows(runs: &[&RunResult]) -> Vec<CurveRow> {
 }
 
 /// The figure of stage gaps, where any method has them.
-fn stage_gaps(files: &[RowFile]) -> Result<Vec<Artifact>, FigureError> {
-    let sources: Vec<Source> = files
-        .iter()
-        .map(|file| Source {
-            name: file.name.clone(),
-            text: file.text.clone(),
-        })
-        .collect();
+fn stage_gaps(runs: &Runs) -> Result<Vec<Artifact>, FigureError> {
+    let sessions = runs.runs.iter().flat_map(|run| {
+        let row = |session: &SessionOffered| Row {
+            key: run.key.clone(),
+            content: Content::Session(session.clone()),
+        };
+        run.sessions.iter().map(row)
+    });
+    let sources = [Source {
+        name: "results".to_owned(),
+        text: super::json_lines(&sessions.collect::<Vec<_>>()),
+    }];
     let request = Request {
         sources: &sources,
         ..Request::default()

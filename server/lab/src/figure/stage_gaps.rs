@@ -88,7 +88,7 @@ fn make(request: &Request) -> Result<String, FigureError> {
     let sheet = SeedSheet {
         groups: plan.groups.iter().map(name).collect(),
         x: "Environment steps",
-        y: "Stage gap (nats)",
+        y: "Stage gap (temporal distance: nats)",
         is_rate: false,
         center: interquartile_mean,
     };

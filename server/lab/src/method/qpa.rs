@@ -1,6 +1,6 @@
 //! QPA: PEBBLE near the policy, in what it asks and in what its critics learn from.
 //!
-//! Without its crops of segments, as in STAIR's comparison.
+//! Without its crops of segments and with PEBBLE's ensemble, as in STAIR's comparison.
 
 use domain::sampler::NearPolicy;
 

@@ -15,7 +15,7 @@ pub(crate) fn surf(config: &RunConfig) -> Method {
     }
 }
 
-/// Without crops, as in STAIR's comparison.
+/// Without crops, as STAIR's comparison has QPA; it has no SURF.
 pub(crate) fn surf_whole(config: &RunConfig) -> Method {
     Method {
         reward_learner: |config| {

@@ -87,7 +87,7 @@ fn return_before_and_after(method: &str, teacher: &str, more: &[&str]) -> (f64, 
     let mut run = Run::start(config, &folder.0).unwrap();
     let (outcome, events) = drive(&mut run, &mut Scripted::new(judge, 0));
     let first = events.iter().find_map(|event| match event {
-        Event::Evaluation(evaluation) => Some(evaluation.return_mean),
+        Event::Evaluation(trial) if trial.step > 0 => Some(trial.return_mean),
         _ => None,
     });
     (first.unwrap(), finished(outcome).return_mean)

@@ -28,6 +28,12 @@ pub trait RewardLearner: Send {
         0
     }
 
+    /// How often a fit at most takes rows of segments through the ensemble, in all answered segments'
+    /// rows, a way back counting as two ways there: what it costs.
+    fn ways_through(&self, max_epochs: u32) -> f64 {
+        3.0 * f64::from(max_epochs)
+    }
+
     /// Steps towards novelty that the ensemble takes beside each exploring update, before the
     /// first answer.
     fn warm_start_steps(&self) -> u32 {

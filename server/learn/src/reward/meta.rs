@@ -61,9 +61,10 @@ impl RewardEnsemble {
         let rows = super::joined(&batch.observation, &batch.action, batch.len());
         let (output, tape) = self.net.forward_taped(&self.input(&rows));
         let rewards = output.tanh();
-        let reward = mean_over_members(&rewards);
+        let scale = self.scale;
+        let reward = (mean_over_members(&rewards) - scale.offset) * scale.factor;
         let outer = agent.outer(batch, &reward, first_steps, weight);
-        let share = outer.reward_slopes / self.config.members as f64;
+        let share = outer.reward_slopes * (scale.factor / self.config.members as f64);
         let slopes = (1.0 - rewards.square()) * share;
         self.parameters.zero_gradient();
         self.net
@@ -95,6 +96,7 @@ mod tests {
     use domain::random::{Rng, Stream};
     use tch::Kind;
 
+    use super::super::Scale;
     use super::super::tests::{labeled, replay, small};
     use super::*;
     use crate::device::Device;
@@ -116,7 +118,7 @@ mod tests {
     }
 
     /// Central differences of the whole inner step and outer loss in each of the ensemble's
-    /// weights, in f64.
+    /// weights, in f64; with rewards as the members say and with normalised ones.
     #[test]
     fn the_bilevel_gradient_agrees_with_finite_differences() {
         let replay = replay(6);
@@ -124,9 +126,18 @@ mod tests {
         let first_steps = first_steps(&replay, &labeled);
         let batch = batch(&replay, 20);
         let double = (Kind::Double, tch::Device::Cpu);
-        for layer_norm in [false, true] {
+        let normalized = Scale {
+            offset: 0.3,
+            factor: 2.5,
+        };
+        for (layer_norm, scale) in [
+            (false, Scale::NONE),
+            (true, Scale::NONE),
+            (false, normalized),
+        ] {
             let agent = Sac::with_kind(&agent(layer_norm), (3, 2), 4, double);
             let mut ensemble = RewardEnsemble::with_kind(&small(), (3, 2), 1, double);
+            ensemble.scale = scale;
             ensemble.steering_gradient(&agent, &batch, &first_steps, 0.1);
             let gradient = Vec::<f64>::try_from(&ensemble.parameters.gradient).expect("numbers");
             let largest = gradient.iter().fold(0.0_f64, |m, g| m.max(g.abs()));

@@ -205,6 +205,12 @@ impl RewardLearner for SemiSupervised {
         self.config.unlabeled_per_query
     }
 
+    /// Answered pairs there and back; for each of them μ others once to be judged and, where a member
+    /// is sure, there and back too.
+    fn ways_through(&self, _max_epochs: u32) -> f64 {
+        f64::from(self.config.passes) * (3.0 + 4.0 * self.config.batch_ratio as f64)
+    }
+
     fn save(&self, archive: &mut Archive) {
         archive.put_json("reward.unlabeled", &self.pool);
         archive.put_json("reward.semi_fits", &self.n_fits);

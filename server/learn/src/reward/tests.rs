@@ -275,6 +275,7 @@ fn the_disagreement_about_a_reward_is_the_members_std_and_goes_to_the_replay() {
 #[test]
 fn normalised_rewards_keep_their_order_and_their_spread() {
     let mut replay = replay(40);
+    replay.keep_disagreement();
     let labeled = labeled(&replay, 100, |_| 5);
     let relabeled = |normalized_std: f64, replay: &mut Replay| {
         let config = RewardConfig {
@@ -284,10 +285,11 @@ fn normalised_rewards_keep_their_order_and_their_spread() {
         let mut ensemble = RewardEnsemble::new(&config, 3, 2, 1, Device::CPU);
         ensemble.fit(replay, &labeled);
         ensemble.relabel(replay);
-        (ensemble, replay.learned_rewards_mut(0).to_vec())
+        let rewards = replay.learned_rewards_mut(0).to_vec();
+        (ensemble, rewards, replay.disagreements_mut(0).to_vec())
     };
-    let (_, plain) = relabeled(0.0, &mut replay);
-    let (ensemble, normal) = relabeled(0.5, &mut replay);
+    let (_, plain, plain_doubt) = relabeled(0.0, &mut replay);
+    let (ensemble, normal, doubt) = relabeled(0.5, &mut replay);
     let moments = |values: &[f32]| {
         let n = values.len() as f64;
         let mean = values.iter().copied().map(f64::from).sum::<f64>() / n;
@@ -307,6 +309,11 @@ fn normalised_rewards_keep_their_order_and_their_spread() {
         let expected = 0.5 * (f64::from(*raw) - plain_mean) / plain_std;
         assert!((f64::from(*own) - expected).abs() < 1e-5);
     }
+    // a bonus for disagreement stays in proportion to the reward
+    for (own, raw) in doubt.iter().zip(&plain_doubt) {
+        let expected = 0.5 * f64::from(*raw) / plain_std;
+        assert!(*raw > 0.0 && (f64::from(*own) - expected).abs() < 1e-5);
+    }
     // what is predicted afterwards is on the same scale, also after a restart
     let mut archive = Archive::new();
     ensemble.save(&mut archive);
@@ -314,6 +321,7 @@ fn normalised_rewards_keep_their_order_and_their_spread() {
     restored.load(&archive).unwrap();
     let mut rows = Vec::new();
     replay.append_lane_rows(0, 0..1, &mut rows);
-    let predicted = restored.predict(&rows[..3], &rows[3..]);
-    assert!((predicted[0] - normal[0]).abs() < 1e-6);
+    let predicted = restored.estimate(&rows[..3], &rows[3..]);
+    assert!((predicted.rewards[0] - normal[0]).abs() < 1e-6);
+    assert!((predicted.disagreements[0] - doubt[0]).abs() < 1e-6);
 }

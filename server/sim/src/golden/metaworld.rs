@@ -299,8 +299,8 @@ fn check_transition(
     Ok(checks)
 }
 
-/// Checks what the original reads freshly at a reset: not the object's slots, which show the
-/// episode before, and not the second half in v2, for the same reason.
+/// Checks what the original reads freshly at a reset: not the object's point where that shows
+/// the episode before, and not the second half in v2, for the same reason.
 fn check_reset(task: &TaskRecordings, line: &Reset) -> Result<Checks, String> {
     let theirs = observation_of(&line.obs)?;
     let rebuilt = (task.rebuild)(&Recorded {
@@ -332,11 +332,18 @@ fn check_reset(task: &TaskRecordings, line: &Reset) -> Result<Checks, String> {
             OBSERVATION_TOLERANCE,
         );
     };
+    let has_second_half = line.ver == Version::V3;
     slots("observation 0-3", 0..4);
     slots("observation 7-17", 7..18);
-    if line.ver == Version::V3 {
+    if has_second_half {
         slots("observation 18-21", 18..22);
         slots("observation 25-35", 25..36);
+    }
+    if task.is_fresh_at_reset {
+        slots("observation 4-6", 4..7);
+        if has_second_half {
+            slots("observation 22-24", 22..25);
+        }
     }
     slots("observation 36-38", 36..39);
     Ok(checks)

@@ -1,4 +1,8 @@
+use std::sync::OnceLock;
+
+use super::trajectory::{HAND_TOLERANCE_M, OBJECT_TOLERANCE};
 use super::*;
+use crate::tasks::tasks;
 
 fn repository() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
@@ -16,77 +20,153 @@ fn a_transition() -> String {
     text.lines().next().expect("it has a line").into()
 }
 
+/// What the repository's recordings come to, replayed once.
+fn packed() -> &'static Report {
+    static REPORT: OnceLock<Report> = OnceLock::new();
+    REPORT.get_or_init(|| {
+        let folder = repository().join("tests/golden");
+        let mut replay = Replay::new();
+        for file in find_recordings(&[folder]).expect("the folder is there") {
+            replay.file(&file).expect("recordings can be read");
+        }
+        replay.finish()
+    })
+}
+
+/// Recordings and fields that have to be compared before a task counts as reproduced.
+fn wanted(task: &str) -> Vec<(String, &'static str)> {
+    if metaworld::knows(task) {
+        let mut wanted = vec![
+            (format!("{task} v2 transitions"), "observation 18-35"),
+            (format!("{task} v2 resets"), "observation 0-3"),
+            (format!("{task} v3 resets"), "observation 18-21"),
+            (format!("{task} v2 trajectories"), "success"),
+        ];
+        for version in ["v2", "v3"] {
+            for field in ["reward", "success", "observation 0-17"] {
+                wanted.push((format!("{task} {version} transitions"), field));
+            }
+        }
+        return wanted;
+    }
+    if robodesk::knows(task) {
+        return vec![
+            (format!("{task} steps"), "reward"),
+            (format!("{task} steps"), "success"),
+            (format!("{task} steps"), "observation 34-67"),
+            (format!("{task} steps"), "target, end effector"),
+            (format!("{task} states"), "success"),
+            ("panda kinematics".into(), "inertia"),
+        ];
+    }
+    // The control suite's, whose names have underscores and begin with the robot's.
+    let robot = task.split('-').next().unwrap_or_default();
+    let (states, kinematics) = (
+        format!("{} states", task.replace('-', "_")),
+        format!("{robot}_kinematics"),
+    );
+    vec![
+        (states.clone(), "reward"),
+        (states, "observation"),
+        (kinematics.clone(), "positions"),
+        (kinematics.clone(), "inertia matrix"),
+        (kinematics, "gravity load"),
+    ]
+}
+
+/// What is [`wanted`] of a task and was not compared.
+fn missing(report: &Report, task: &str) -> Vec<(String, &'static str)> {
+    let was_compared = |recording: &str, field: &str| {
+        let fields = &mut report.fields.iter();
+        fields.any(|f| f.recording == recording && f.field == field)
+    };
+    let mut wanted = wanted(task);
+    wanted.retain(|(recording, field)| !was_compared(recording, field));
+    wanted
+}
+
 #[test]
 fn the_recordings_of_the_originals_are_reproduced() {
-    let mut replay = Replay::new();
-    for file in find_recordings(&[repository().join("tests/golden")]).expect("the folder is there")
-    {
-        replay.file(&file).expect("recordings can be read");
-    }
-    let report = replay.finish();
+    let report = packed();
     assert_eq!(report.malformed, Vec::<String>::new());
     assert!(report.n_checked > 1000, "{} lines", report.n_checked);
     for field in &report.fields {
         assert!(field.is_within_tolerance(), "{field:?}");
     }
-    let has = |recording: &str, field: &str| {
-        let fields = &mut report.fields.iter();
-        fields.any(|f| f.recording == recording && f.field == field)
-    };
-    for task in figures::REFERENCES.map(|reference| reference.task) {
-        for version in ["v2", "v3"] {
-            for field in ["reward", "success", "observation 0-17"] {
-                let recording = format!("{task} {version} transitions");
-                assert!(has(&recording, field), "{recording}: {field}");
-            }
-        }
-        assert!(has(&format!("{task} v2 transitions"), "observation 18-35"));
-        assert!(has(&format!("{task} v3 resets"), "observation 18-21"));
-        assert!(has(&format!("{task} v2 trajectories"), "success"));
-    }
-    for field in [
-        "reward",
-        "success",
-        "observation 34-67",
-        "target, end effector",
-    ] {
-        assert!(has("push-green steps", field), "{field}");
-    }
-    assert!(has("push-green states", "success"));
-    assert!(has("panda kinematics", "inertia"));
-    for task in [
-        "walker_run",
-        "cheetah_run",
-        "quadruped_walk",
-        "quadruped_run",
-    ] {
-        for field in ["reward", "observation"] {
-            assert!(has(&format!("{task} states"), field), "{task}: {field}");
-        }
-    }
-    for robot in ["walker", "cheetah", "quadruped"] {
-        for field in ["positions", "inertia matrix", "gravity load"] {
-            let recording = format!("{robot}_kinematics");
-            assert!(has(&recording, field), "{recording}: {field}");
+}
+
+#[test]
+fn every_task_that_has_an_original_is_compared_with_it() {
+    for task in tasks() {
+        // Our own, which has no original.
+        if task.name != "go-fetch-return" {
+            assert_eq!(missing(packed(), task.name), [], "{}", task.name);
         }
     }
 }
 
-/// One expert's episode of each task. Others can end elsewhere: where a fist slips off a handle,
-/// a millimetre decides.
 #[test]
-fn our_physics_follows_the_recorded_actions() {
-    let mut replay = Replay::new();
-    for file in find_recordings(&[repository().join("tests/golden")]).expect("the folder is there")
-    {
-        replay.file(&file).expect("recordings can be read");
+fn a_task_without_recordings_is_noticed() {
+    assert!(!missing(packed(), "humanoid-run").is_empty());
+    for task in ["sweep-into", "push-green", "walker-run"] {
+        let stem = task.replace('-', "_");
+        let mut report = packed().clone();
+        let is_its =
+            |f: &FieldReport| f.recording.starts_with(task) || f.recording.starts_with(&stem);
+        report.fields.retain(|f| !is_its(f));
+        assert!(!missing(&report, task).is_empty(), "{task}");
     }
-    let report = replay.finish();
-    for task in figures::REFERENCES.map(|reference| reference.task) {
-        let is_its = |d: &&DynamicsReport| d.recording.starts_with(task);
-        let dynamics = report.dynamics.iter().find(is_its).expect("a trajectory");
-        assert!(dynamics.n_free > 5, "{dynamics:?}");
-        assert!(dynamics.is_within_tolerance(), "{dynamics:?}");
+}
+
+/// There the hand slips in behind the handle and turns it back, here friction holds it: only the
+/// hand is compared.
+const SLIPS_IN: &str = "faucet-open v2 expert, seed 301";
+/// The hand is free for one step, over which an rms says nothing: only the object is compared.
+const HARDLY_FREE: &str = "door-unlock v2 expert, seed 300";
+
+/// Where a fist slips off a handle, a millimetre decides: of the larger set that the packed
+/// recordings are taken from, two episodes are compared in part.
+#[test]
+fn our_physics_follows_the_recorded_experts() {
+    let experts = || packed().dynamics.iter().filter(|d| d.is_expert);
+    for d in experts() {
+        if d.recording != HARDLY_FREE {
+            assert!(d.n_free > 5 && d.hand_rms_m <= HAND_TOLERANCE_M, "{d:?}");
+        }
+        if d.recording != SLIPS_IN {
+            assert!(d.object_error() <= OBJECT_TOLERANCE, "{d:?}");
+        }
+    }
+    for known in metaworld::TASKS {
+        let is_its = |d: &DynamicsReport| d.recording.starts_with(&format!("{} ", known.name));
+        assert!(experts().any(is_its), "{} has no trajectory", known.name);
+    }
+}
+
+#[test]
+fn a_reset_shows_the_object_unless_the_original_shows_the_one_before() {
+    for (task, is_compared) in [
+        ("door-open", true),
+        ("door-unlock", true),
+        ("sweep-into", true),
+        ("window-open", false),
+        ("window-close", false),
+        ("drawer-open", false),
+        ("faucet-open", false),
+    ] {
+        let path = repository().join(format!("tests/golden/{task}_resets.jsonl"));
+        let text = fs::read_to_string(path).expect("the recording is part of the repository");
+        for line in text.lines() {
+            let mut reset: serde_json::Value = serde_json::from_str(line).expect("it is JSON");
+            assert!(replay(&reset.to_string()).is_within_tolerance(), "{task}");
+            let shown = reset["obs"][5].as_f64().expect("a number");
+            reset["obs"][5] = serde_json::json!(shown + 2e-5);
+            let report = replay(&reset.to_string());
+            let wrong = report.fields.iter().filter(|f| !f.is_within_tolerance());
+            let wrong: Vec<_> = wrong.map(|f| f.field).collect();
+            let found = ["observation 4-6"];
+            assert_eq!(wrong, &found[..usize::from(is_compared)], "{task}");
+        }
     }
 }
 

@@ -65,13 +65,14 @@
 //! `return` while the object is held or at the goal; otherwise `fetch` while ‖b − j‖ ≤ 0.35, and
 //! `go` beyond. For evaluation only.
 
-use domain::environment::{EnvError, EnvSpec, Environment, EpisodeEnd, Step, checked_action};
+use domain::environment::{EnvError, EnvSpec, Environment, Step};
 use domain::random::{Rng, Stream};
 use rapier3d::prelude::{ColliderBuilder, LockedAxes, RigidBodyBuilder, RigidBodyHandle, Vector};
 use serde::{Deserialize, Serialize};
 
 use self::view::{View, norm};
 use super::Task;
+use crate::course::Course;
 use crate::robots::planar_robot::PlanarRobot;
 use crate::world::{self, Timing, World};
 
@@ -152,8 +153,7 @@ struct State {
     object: RigidBodyHandle,
     goal: [f32; 2],
     is_held: bool,
-    seed: u64,
-    n_steps: u32,
+    course: Course,
 }
 
 impl GoFetchReturn {
@@ -176,16 +176,19 @@ impl Environment for GoFetchReturn {
     }
 
     fn step(&mut self, action: &[f32]) -> Result<Step, EnvError> {
-        let action = checked_action::<ACTION_SIZE>(NAME, action)?;
-        self.state.advance(action.map(|a| a as f32))?;
+        let action: [f64; ACTION_SIZE] = self.state.course.begin_step(NAME, action)?;
+        let is_finite = self.state.advance(action.map(|a| a as f32));
+        let pose = self.pose();
+        self.state.course.check_state(NAME, is_finite, &pose)?;
         let view = self.state.view();
-        Ok(Step {
+        let step = Step {
             observation: view.observation(),
             task_reward: view.task_reward(),
             success: view.is_success(),
-            end: (self.state.n_steps >= EPISODE_LEN).then_some(EpisodeEnd::TimeLimit),
+            end: self.state.course.end(EPISODE_LEN),
             stage: Some(view.stage()),
-        })
+        };
+        self.state.course.checked_step(NAME, step)
     }
 
     fn pose(&self) -> Vec<f32> {
@@ -226,28 +229,22 @@ impl State {
             object,
             goal: start.goal,
             is_held: false,
-            seed,
-            n_steps: 0,
+            course: Course::new(seed),
         }
     }
 
-    fn advance(&mut self, action: [f32; ACTION_SIZE]) -> Result<(), EnvError> {
+    /// One control step; says whether the physics is still one of finite numbers.
+    #[must_use = "a world that left the finite numbers must end its episode"]
+    fn advance(&mut self, action: [f32; ACTION_SIZE]) -> bool {
         let [drive_x, drive_y, jaws] = action;
-        self.n_steps += 1;
         let pull = if self.is_held { self.grip() } else { [0.0; 2] };
         let object = &mut self.world.physics.bodies[self.object];
         object.reset_forces(true);
         object.add_force(Vector::new(-pull[0], -pull[1], 0.0), true);
         self.robot.drive(&mut self.world, [drive_x, drive_y], pull);
-        if !self.world.step() {
-            return Err(EnvError::NotFinite {
-                task: NAME.into(),
-                seed: self.seed,
-                step: self.n_steps,
-            });
-        }
+        let is_finite = self.world.step();
         self.move_jaws(jaws);
-        Ok(())
+        is_finite
     }
 
     /// The force with which a held object pulls at the jaws, newtons: a critically damped spring,

@@ -10,11 +10,10 @@
 //! keeps the robot in sight and the floor shows its speed. The originals' cameras follow the
 //! centre of mass up and down as well; here the horizon stays where it is.
 
-use domain::environment::{
-    EnvError, EnvSpec, Environment, EpisodeEnd, Step, TaskReward, checked_action,
-};
+use domain::environment::{EnvError, EnvSpec, Environment, Step, TaskReward};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
+use crate::course::Course;
 use crate::world;
 
 pub mod picture;
@@ -87,16 +86,14 @@ pub struct Locomotion<G, const A: usize> {
 #[derive(Serialize, Deserialize)]
 struct State<G> {
     gait: G,
-    seed: u64,
-    n_steps: u32,
+    course: Course,
 }
 
 impl<G> State<G> {
     fn new(gait: G, seed: u64) -> Self {
         Self {
             gait,
-            seed,
-            n_steps: 0,
+            course: Course::new(seed),
         }
     }
 }
@@ -108,6 +105,12 @@ impl<G: Gait<A>, const A: usize> Locomotion<G, A> {
             spec: G::SIZES.spec(),
             state: State::new(G::begin(0), 0),
         }
+    }
+
+    /// The robot, for a test to break.
+    #[cfg(test)]
+    pub(super) fn gait(&mut self) -> &mut G {
+        &mut self.state.gait
     }
 }
 
@@ -129,25 +132,19 @@ impl<G: Gait<A>, const A: usize> Environment for Locomotion<G, A> {
 
     fn step(&mut self, action: &[f32]) -> Result<Step, EnvError> {
         let name = G::SIZES.name;
-        let action = checked_action::<A>(name, action)?;
-        let State { gait, n_steps, .. } = &mut self.state;
+        let State { gait, course } = &mut self.state;
+        let action = course.begin_step(name, action)?;
         gait.advance(&action);
-        *n_steps += 1;
-        if !gait.is_finite() {
-            return Err(EnvError::NotFinite {
-                task: name.into(),
-                seed: self.state.seed,
-                step: self.state.n_steps,
-            });
-        }
+        course.check_state(name, gait.is_finite(), &single(gait.configuration()))?;
         let (observation, reward) = gait.judge();
-        Ok(Step {
+        let step = Step {
             observation: single(&observation),
             task_reward: TaskReward(reward),
             success: false,
-            end: (*n_steps >= EPISODE_LEN).then_some(EpisodeEnd::TimeLimit),
+            end: course.end(EPISODE_LEN),
             stage: None,
-        })
+        };
+        course.checked_step(name, step)
     }
 
     fn pose(&self) -> Vec<f32> {

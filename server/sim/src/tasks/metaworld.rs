@@ -6,14 +6,13 @@
 
 use std::fmt::Debug;
 
-use domain::environment::{
-    EnvError, EnvSpec, Environment, EpisodeEnd, Step, TaskReward, checked_action,
-};
+use domain::environment::{EnvSpec, Environment, Step, TaskReward};
 use domain::random::Rng;
 use rapier3d::prelude::PhysicsWorld;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
+use crate::course::Course;
 use crate::robots::sawyer_hand::{self, HandRange, SawyerHand};
 use crate::robots::tabletop;
 use crate::world::World;
@@ -206,8 +205,7 @@ pub struct Episode {
     pub hand: SawyerHand,
     /// Where the fingertips were at the reset, metres.
     pub init_tcp: Point,
-    seed: u64,
-    n_steps: u32,
+    course: Course,
     before: [f64; MOMENT_SIZE],
 }
 
@@ -222,8 +220,7 @@ impl Episode {
             init_tcp: hand.fingertips(&world.physics),
             world,
             hand,
-            seed,
-            n_steps: 0,
+            course: Course::new(seed),
             before: [0.0; MOMENT_SIZE],
         }
     }
@@ -234,29 +231,15 @@ impl Episode {
         self.observe(now)
     }
 
-    /// Moves target, fingers and physics with the task's object by one control step.
-    ///
-    /// # Errors
-    /// Actions that do not fit leave the state unchanged; a world that left the finite numbers
-    /// says so.
-    pub fn advance<S: Setup>(&mut self, setup: &S, action: &[f32]) -> Result<(), EnvError> {
-        let action = checked_action::<4>(S::NAME, action)?;
+    /// Moves target, fingers and physics with the task's object by one control step; says
+    /// whether the physics is still one of finite numbers.
+    #[must_use = "a world that left the finite numbers must end its episode"]
+    pub fn advance<S: Setup>(&mut self, setup: &S, action: [f64; 4]) -> bool {
         setup.meet_stops(&mut self.world.physics);
         self.hand.drive(&mut self.world.physics, action);
-        self.n_steps += 1;
-        let position_is_finite = |episode: &Self| {
-            let position = episode.hand.position(&episode.world.physics);
-            position.iter().all(|x| x.is_finite())
-        };
-        if self.world.step() && position_is_finite(self) {
-            self.hand.feel(&self.world.physics);
-            return Ok(());
-        }
-        Err(EnvError::NotFinite {
-            task: S::NAME.into(),
-            seed: self.seed,
-            step: self.n_steps,
-        })
+        let is_finite = self.world.step();
+        self.hand.feel(&self.world.physics);
+        is_finite
     }
 
     /// What the present state says, given where the object is.
@@ -279,7 +262,7 @@ impl Episode {
             observation: self.observe(now),
             task_reward: TaskReward(judgement.reward),
             success: judgement.success,
-            end: (self.n_steps >= EPISODE_LEN).then_some(EpisodeEnd::TimeLimit),
+            end: self.course.end(EPISODE_LEN),
             stage: None,
         }
     }

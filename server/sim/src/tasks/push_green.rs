@@ -32,15 +32,14 @@
 //! Differs from the original: see `robots::panda` and [`desk`].
 //! Source: DMCONTROL_ROBODESK.md 5; the dense reward and the 68 numbers are the paper's.
 
-use domain::environment::{
-    EnvError, EnvSpec, Environment, EpisodeEnd, Step, TaskReward, checked_action,
-};
+use domain::environment::{EnvError, EnvSpec, Environment, Step, TaskReward};
 use domain::random::{Rng, Stream};
 use domain::scene::{Frame, Scene, Transform};
 use serde::{Deserialize, Serialize};
 
 use super::Task;
 use super::desk::{self, BUTTONS, Desk, LIGHTS, Layer, N_POSITIONS};
+use crate::course::Course;
 use crate::robots::panda::{self, ACTION_SIZE, N_JOINTS, Panda, Point, links};
 use crate::world::{self, Timing, World};
 
@@ -140,8 +139,7 @@ struct State {
     world: World,
     panda: Panda,
     desk: Desk,
-    seed: u64,
-    n_steps: u32,
+    course: Course,
     /// The moment that the last observation showed first.
     before: Vec<f64>,
 }
@@ -190,8 +188,7 @@ impl State {
             world,
             panda,
             desk,
-            seed,
-            n_steps: 0,
+            course: Course::new(seed),
             before: Vec::new(),
         };
         state.before = state.readings().moment().to_vec();
@@ -205,23 +202,16 @@ impl State {
         }
     }
 
-    fn advance(&mut self, action: &[f64; ACTION_SIZE]) -> Result<(), EnvError> {
+    /// One control step; says whether the physics is still one of finite numbers.
+    #[must_use = "a world that left the finite numbers must end its episode"]
+    fn advance(&mut self, action: &[f64; ACTION_SIZE]) -> bool {
         let joints = self.panda.joints(&self.world.physics);
         let targets = panda::targets(&joints, action);
         self.panda.hold(&mut self.world.physics, &targets);
-        self.n_steps += 1;
         let is_finite = self.world.step();
         self.desk
             .follow(&self.world.physics, f64::from(CONTROL_PERIOD_S));
-        let joints = self.panda.joints(&self.world.physics);
-        if is_finite && joints.iter().all(|q| q.is_finite()) {
-            return Ok(());
-        }
-        Err(EnvError::NotFinite {
-            task: NAME.into(),
-            seed: self.seed,
-            step: self.n_steps,
-        })
+        is_finite
     }
 
     /// The observation of `now`, which then is the moment before.
@@ -244,16 +234,19 @@ impl Environment for PushGreen {
     }
 
     fn step(&mut self, action: &[f32]) -> Result<Step, EnvError> {
-        let action = checked_action::<ACTION_SIZE>(NAME, action)?;
-        self.state.advance(&action)?;
+        let action = self.state.course.begin_step(NAME, action)?;
+        let is_finite = self.state.advance(&action);
+        let pose = self.pose();
+        self.state.course.check_state(NAME, is_finite, &pose)?;
         let readings = self.state.readings();
-        Ok(Step {
+        let step = Step {
             observation: self.state.observe(&readings.moment()),
             task_reward: TaskReward(readings.reward()),
             success: readings.is_lit(),
-            end: (self.state.n_steps >= EPISODE_LEN).then_some(EpisodeEnd::TimeLimit),
+            end: self.state.course.end(EPISODE_LEN),
             stage: None,
-        })
+        };
+        self.state.course.checked_step(NAME, step)
     }
 
     fn pose(&self) -> Vec<f32> {
@@ -286,6 +279,9 @@ fn spec() -> EnvSpec {
 }
 
 /// With closed fingers: up in front of the desk where they start low, over the button, down on it.
+/// The original's script (DYNAMICS R7) goes straight over the button and then down for ever: the
+/// detour keeps low starts off the desk's edge, and the wider circle once below 0.88 m stands in
+/// for the script's memory of being on its way down.
 fn expert(observation: &[f32]) -> Vec<f32> {
     let here = [observation[0], observation[1], observation[2]];
     let [x, y, _] = BUTTONS[GREEN].map(|x| x as f32);

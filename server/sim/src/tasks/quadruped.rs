@@ -36,6 +36,9 @@
 //! # Success
 //! None; see [`super::locomotion`].
 //!
+//! Differs from the original: the dynamics are articulated ones of our own, not MuJoCo's and, unlike
+//! those of other tasks, not rapier3d's either; [`crate::articulated`] says why. Pictures follow the
+//! robot along the ground only, see [`super::locomotion`], and begin with a nearer camera.
 //! Source: `quadruped.py` of dm_control 1.0.14.
 
 use domain::random::{Rng, Stream};

@@ -1,3 +1,6 @@
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread;
+
 use domain::environment::{EnvError, Step};
 use domain::random::{Rng, Stream};
 
@@ -164,6 +167,14 @@ const VIOLENCES: [Violence; 6] = [
 ];
 
 impl Violence {
+    /// How much of it every task has to bear.
+    fn n_steps(self) -> u32 {
+        match self {
+            Self::Random => 100_000,
+            _ => 1_500,
+        }
+    }
+
     fn act(self, index: u32, rng: &mut Rng, action: &mut [f32]) {
         for value in action {
             match self {
@@ -181,19 +192,95 @@ impl Violence {
 
 #[test]
 fn every_task_stays_finite_and_in_range_under_random_and_violent_actions() {
+    let mut episodes = Vec::new();
     for task in tasks() {
-        let spec = (task.spec)();
+        for violence in VIOLENCES {
+            let n_episodes = violence.n_steps().div_ceil((task.spec)().episode_len);
+            episodes.extend((0..n_episodes).map(|_| (task, violence)));
+        }
+    }
+    on_every_core(episodes.len(), |number| {
+        let (task, violence) = episodes[number];
+        let (spec, mut environment) = ((task.spec)(), (task.make)());
+        let mut rng = Rng::new(21, Stream::Test, number as u64);
+        let mut action = vec![0.0; spec.action_size];
+        environment.reset(number as u64);
+        for index in 0..spec.episode_len {
+            violence.act(index, &mut rng, &mut action);
+            let step = environment.step(&action).expect("finite");
+            assert_is_sound(task, &spec, &step);
+        }
+    });
+}
+
+/// Plays so many episodes by their number, on as many threads as the machine has cores.
+fn on_every_core(n_episodes: usize, play: impl Fn(usize) + Sync) {
+    let next = AtomicUsize::new(0);
+    let n_threads = thread::available_parallelism().map_or(1, usize::from);
+    thread::scope(|scope| {
+        for _ in 0..n_threads {
+            scope.spawn(|| {
+                let turns = std::iter::repeat_with(|| next.fetch_add(1, Ordering::Relaxed));
+                turns
+                    .take_while(|number| *number < n_episodes)
+                    .for_each(&play);
+            });
+        }
+    });
+}
+
+type Policy = Box<dyn FnMut(&[f32]) -> Vec<f32> + Send>;
+
+/// An environment among several, who acts in it, and what came of it.
+struct Lane {
+    environment: Box<dyn Environment>,
+    policy: Policy,
+    observation: Vec<f32>,
+    steps: Vec<Step>,
+}
+
+impl Lane {
+    fn new(task: &Task, seed: u64) -> Self {
         let mut environment = (task.make)();
-        let mut rng = Rng::new(21, Stream::Test, 0);
-        for episode in 0..100_000 / u64::from(spec.episode_len) / tasks().len() as u64 {
-            environment.reset(episode);
-            let violence = VIOLENCES[episode as usize % VIOLENCES.len()];
-            let mut action = vec![0.0; spec.action_size];
-            for index in 0..spec.episode_len {
-                violence.act(index, &mut rng, &mut action);
-                let step = environment.step(&action).expect("finite");
-                assert_is_sound(task, &spec, &step);
+        Self {
+            observation: environment.reset(seed),
+            environment,
+            policy: Box::new(best_policy(task, seed)),
+            steps: Vec::new(),
+        }
+    }
+
+    fn step(&mut self) {
+        let action = (self.policy)(&self.observation);
+        let step = self.environment.step(&action).expect("a valid action");
+        self.observation.clone_from(&step.observation);
+        self.steps.push(step);
+    }
+}
+
+#[test]
+fn every_task_gives_the_same_steps_on_several_threads_as_on_one() {
+    for task in tasks() {
+        let lanes = || (0..4).map(|seed| Lane::new(task, seed)).collect::<Vec<_>>();
+        let (mut on_one, mut on_several) = (lanes(), lanes());
+        for _ in 0..30 {
+            on_one.iter_mut().for_each(Lane::step);
+        }
+        // Another thread every ten steps: a lane keeps nothing on the one it leaves.
+        for _ in 0..3 {
+            thread::scope(|scope| {
+                for lane in &mut on_several {
+                    scope.spawn(move || (0..10).for_each(|_| lane.step()));
+                }
+            });
+        }
+        for (one, several) in on_one.iter().zip(&on_several) {
+            assert_eq!(several.steps.len(), 30);
+            for (index, (a, b)) in one.steps.iter().zip(&several.steps).enumerate() {
+                assert!(is_same(a, b), "{} differs at step {index}", task.name);
             }
+            let (one, several) = (one.environment.snapshot(), several.environment.snapshot());
+            assert!(one == several, "{}", task.name);
         }
     }
 }
@@ -206,17 +293,25 @@ fn every_task_clamps_large_actions_and_refuses_wrong_ones_without_moving() {
         environment.reset(2);
         clamped.reset(2);
         let before = environment.snapshot();
-        assert!(matches!(
-            environment.step(&vec![0.0; spec.action_size + 1]),
-            Err(EnvError::ActionSize { expected, .. }) if expected == spec.action_size
-        ));
-        for bad in [f32::NAN, f32::INFINITY] {
-            let mut action = vec![0.0; spec.action_size];
-            action[1] = bad;
-            assert!(matches!(
-                environment.step(&action),
-                Err(EnvError::ActionNotFinite { index: 1, .. })
-            ));
+        for size in [0, 1, spec.action_size - 1, spec.action_size + 1] {
+            let refused = environment.step(&vec![0.0; size]);
+            let error = EnvError::ActionSize {
+                task: task.name.into(),
+                expected: spec.action_size,
+                got: size,
+            };
+            assert_eq!(refused, Err(error));
+        }
+        for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            for place in [0, spec.action_size - 1] {
+                let mut action = vec![0.0; spec.action_size];
+                action[place] = bad;
+                assert!(matches!(
+                    environment.step(&action),
+                    Err(EnvError::ActionNotFinite { index, value, .. })
+                        if index == place && value.to_bits() == bad.to_bits()
+                ));
+            }
         }
         assert_eq!(environment.snapshot(), before, "{}", task.name);
         let large = environment

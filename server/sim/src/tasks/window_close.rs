@@ -27,7 +27,9 @@
 //! `|h.x − T.x| ≤ 0.05`.
 //!
 //! Differs from the original: `h₀` and the first observation show this episode's window (there
-//! a stale read shows the one before); see also `robots::sawyer_hand`.
+//! a stale read shows the one before). The pane's stops are stiffer than those of
+//! `tasks::assembly`, as there the pane also meets its frame, see [`window`]. See also
+//! `robots::sawyer_hand`.
 //! Source: METAWORLD.md 3.4 and 1.9, METAWORLD_EXPERTS.md.
 
 use domain::random::Rng;

@@ -161,6 +161,11 @@ fn an_empty_product_is_refused() {
 fn settings_with_one_name_and_far_too_many_runs_are_refused() {
     let told_twice = told(&SMALL_TASK.replace("\"80 labels\"\n", "\"40 labels\"\n"));
     assert!(told_twice.contains("twice"), "{told_twice}");
+    let told_alike = told(&SMALL_TASK.replace("\"80 labels\"\n", "\"40-labels\"\n"));
+    assert!(
+        told_alike.contains("'40 labels' and '40-labels' would share"),
+        "{told_alike}"
+    );
     let told_many = told(&SMALL_TASK.replacen("seeds = 2", "seeds = 4000000", 1));
     assert!(told_many.contains("more than"), "{told_many}");
 }

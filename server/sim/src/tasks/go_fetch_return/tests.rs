@@ -1,4 +1,5 @@
 use super::*;
+use crate::course::tests::{assert_loses_the_episode, spoil_a_free_body};
 use crate::expert::{Rollout, rollout};
 use crate::robots::planar_robot::PlanarState;
 
@@ -38,7 +39,11 @@ fn holding(seed: u64) -> GoFetchReturn {
             .step(&expert(&observation))
             .expect("a valid action")
             .observation;
-        assert!(environment.state.n_steps < EPISODE_LEN, "never held");
+        assert_eq!(
+            environment.state.course.end(EPISODE_LEN),
+            None,
+            "never held"
+        );
     }
     environment
 }
@@ -178,4 +183,14 @@ fn the_observation_stays_within_a_few_units() {
         });
     }
     assert!(largest.iter().all(|&x| x <= 2.0), "{largest:?}");
+}
+
+#[test]
+fn a_number_that_is_none_loses_the_episode() {
+    assert_loses_the_episode(GoFetchReturn::new(), |environment| {
+        spoil_a_free_body(&mut environment.state.world);
+    });
+    assert_loses_the_episode(GoFetchReturn::new(), |environment| {
+        environment.state.goal[0] = f32::NAN;
+    });
 }

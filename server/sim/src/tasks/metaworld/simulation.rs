@@ -87,10 +87,16 @@ impl<S: Setup + Send> Environment for Simulation<S> {
 
     fn step(&mut self, action: &[f32]) -> Result<Step, EnvError> {
         let State { episode, setup } = &mut self.state;
-        episode.advance(setup, action)?;
+        let action = episode.course.begin_step(S::NAME, action)?;
+        let is_finite = episode.advance(setup, action);
+        let pose = self.pose();
+        let course = &mut self.state.episode.course;
+        course.check_state(S::NAME, is_finite, &pose)?;
         let readings = self.readings();
         let (now, judgement) = (S::moment(&readings), S::judge(&readings));
-        Ok(self.state.episode.finish_step(now, judgement))
+        let episode = &mut self.state.episode;
+        let step = episode.finish_step(now, judgement);
+        episode.course.checked_step(S::NAME, step)
     }
 
     fn pose(&self) -> Vec<f32> {
@@ -107,5 +113,31 @@ impl<S: Setup + Send> Environment for Simulation<S> {
     fn restore(&mut self, snapshot: &[u8]) -> Result<(), EnvError> {
         self.state = world::restore(S::NAME, snapshot)?;
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::course::tests::{assert_loses_the_episode, spoil_a_free_body};
+    use crate::tasks::sweep_into::SweepInto;
+    use crate::tasks::window_open::WindowOpen;
+
+    #[test]
+    fn a_velocity_that_is_no_number_loses_the_episode() {
+        // The hand, and the block.
+        assert_loses_the_episode(Simulation::<WindowOpen>::new(), |environment| {
+            spoil_a_free_body(&mut environment.state.episode.world);
+        });
+        assert_loses_the_episode(Simulation::<SweepInto>::new(), |environment| {
+            spoil_a_free_body(&mut environment.state.episode.world);
+        });
+    }
+
+    #[test]
+    fn a_number_too_large_to_be_shown_loses_the_episode() {
+        assert_loses_the_episode(Simulation::<WindowOpen>::new(), |environment| {
+            environment.state.episode.before[4] = 1e300;
+        });
     }
 }

@@ -1,4 +1,5 @@
 use super::*;
+use crate::course::tests::{assert_loses_the_episode, spoil_a_free_body};
 use crate::expert::{Rollout, rollout};
 
 /// A desk with its arm at home and everything closed, as DYNAMICS R1–R5 start.
@@ -251,4 +252,14 @@ fn a_pose_shows_the_hand_where_it_is_and_the_light_when_it_is_on() {
     let height = |frame: &Frame| frame[light].position[2];
     pose[N_JOINTS + LIGHTS + GREEN] = -0.0046;
     assert!(height(&place(&pose)) > height(&frame) + 0.02);
+}
+
+#[test]
+fn a_number_that_is_none_or_too_large_to_be_shown_loses_the_episode() {
+    assert_loses_the_episode(PushGreen::new(), |environment| {
+        spoil_a_free_body(&mut environment.state.world);
+    });
+    assert_loses_the_episode(PushGreen::new(), |environment| {
+        environment.state.before[0] = 1e300;
+    });
 }

@@ -236,9 +236,9 @@ fn an_open_loop_trot_walks_at_the_original_pace() {
 fn chance_does_not_pull_the_coupled_joints_apart() {
     let mut rng = Rng::new(5, Stream::Test, 0);
     let mut widest = 0.0_f64;
-    for seed in 0..3 {
+    for seed in 0..10 {
         let mut quadruped = begin(seed);
-        for _ in 0..300 {
+        for _ in 0..1000 {
             let action = std::array::from_fn(|_| rng.uniform_in(-1.0, 1.0));
             quadruped.advance(&quadruped::commands(&action));
             for index in 0..4 {

@@ -2,6 +2,7 @@
 //! 2.3.7, whose newer versions agree with it to 0.001.
 
 use super::*;
+use crate::course::tests::assert_loses_the_episode;
 
 const STEP_S: f64 = 0.0025;
 
@@ -165,4 +166,17 @@ fn reward_needs_height_uprightness_and_speed() {
     assert!(is(reward(1.3, 1.0, 8.0), 1.0) && is(reward(1.3, 1.0, 20.0), 1.0));
     assert!(is(reward(1.3, 1.0, -3.0), 1.0 / 6.0));
     assert!(is(reward(0.6, -1.0, 4.0), 0.3 / 4.0 * 3.5 / 6.0));
+}
+
+#[test]
+fn a_number_that_is_none_or_too_large_loses_the_episode() {
+    let spoilt = |spoil: fn(&mut Simulation<N_DOFS>)| {
+        assert_loses_the_episode(Locomotion::<Walker, ACTION_SIZE>::new(), |environment| {
+            spoil(&mut environment.gait().simulation);
+        });
+    };
+    spoilt(|walker| walker.v[4] = f64::NAN);
+    spoilt(|walker| walker.v[4] = 1e300);
+    // A place that the pose cannot show.
+    spoilt(|walker| walker.q[1] = 1e39);
 }

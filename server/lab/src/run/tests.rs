@@ -1,0 +1,98 @@
+//! What a method's recipe makes of a run, by looking into one.
+
+use std::path::PathBuf;
+use std::sync::mpsc::channel;
+
+use domain::teacher::{Oracle, Scripted};
+
+use super::*;
+use crate::config::Layers;
+
+/// A run of the small task with its folder, which goes with it.
+struct Trained {
+    run: Run,
+    folder: PathBuf,
+}
+
+impl Trained {
+    /// To its end: 3 sessions of 4 at steps 300, 450 and 600.
+    fn new(method: &str, more: &[&str]) -> Self {
+        let settings = [
+            "training.total_steps=700",
+            "training.seed_steps=100",
+            "training.updates_after_reset=2",
+            "feedback.first_step=300",
+            "feedback.every=150",
+            "feedback.queries_per_session=4",
+            "feedback.budget=12",
+            "evaluation.episodes=1",
+            "agent.hidden=[16]",
+            "agent.batch=16",
+            "reward.hidden=[16]",
+        ];
+        let overrides = settings.iter().chain(more);
+        let config = RunConfig::resolve(&Layers {
+            task: Some("go-fetch-return".into()),
+            method: Some(method.into()),
+            overrides: overrides.map(ToString::to_string).collect(),
+            ..Layers::default()
+        });
+        let name = format!("stair-run-{method}-{}-{}", more.len(), std::process::id());
+        let folder = std::env::temp_dir().join(name);
+        let _ = std::fs::remove_dir_all(&folder); // an earlier test run may have been killed
+        let mut run = Run::start(config.expect("settings"), &folder).expect("a run");
+        let (_commands, receiver) = channel();
+        let mut teacher = Scripted::new(Box::new(Oracle), 0);
+        let outcome = run.drive(&mut teacher, &receiver, &mut |_| {});
+        assert!(matches!(outcome, Ok(Outcome::Finished(_))), "{outcome:?}");
+        Self { run, folder }
+    }
+}
+
+impl Drop for Trained {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.folder); // best effort: it is a temporary folder
+    }
+}
+
+#[test]
+fn qpa_asks_about_the_newest_episodes_and_trains_on_them_until_its_budget_is_spent() {
+    let more = ["queries.near_policy_episodes=2", "feedback.budget=16"];
+    let trained = Trained::new("qpa", &more);
+    let run = &trained.run;
+    assert_eq!(run.pool().newest_episodes, 2);
+    let complete = run.replay.complete_episodes();
+    let newest = &complete[complete.len() - 2..];
+    let mut rng = Rng::new(1, Stream::Test, 0);
+    let drawn = run.pool().draw(&run.replay, 50, &mut rng);
+    let segments = drawn.iter().flat_map(|query| [query.first, query.second]);
+    let episodes: Vec<_> = segments.map(|segment| segment.episode).collect();
+    assert!(episodes.iter().all(|id| newest.contains(id)));
+    assert!(newest.iter().all(|id| episodes.contains(id)));
+
+    let steps = 2 * run.spec.episode_len as usize;
+    assert_eq!(run.batches(700).recent, Some(steps), "12 of 16 answers");
+    let spent = Trained::new("qpa", &more[..1]);
+    assert_eq!(spent.run.batches(700).recent, None, "all answers are given");
+    let pebble = Trained::new("pebble", &more);
+    assert_eq!(pebble.run.batches(700).recent, None);
+    assert_eq!(pebble.run.pool().newest_episodes, 100);
+}
+
+#[test]
+fn mrn_steers_every_n_steps_by_the_latest_session_until_its_budget_is_spent() {
+    let more = ["steering.every=200", "feedback.budget=16"];
+    let mut trained = Trained::new("mrn", &more);
+    let run = &mut trained.run;
+    assert!(run.steering(399, 400).is_some());
+    assert!(run.steering(400, 401).is_none() && run.steering(398, 399).is_none());
+    let latest = run.latest_answers();
+    assert_eq!(latest, run.preferences.labeled(true)[8..]);
+    assert_eq!(latest.len(), 4);
+    run.progress.n_fits = 0;
+    assert!(run.steering(399, 400).is_none(), "no reward is learned yet");
+    let spent = Trained::new("mrn", &more[..1]);
+    assert!(spent.run.steering(399, 400).is_none());
+    let pebble = Trained::new("pebble", &[]);
+    assert!(pebble.run.steering(399, 400).is_none());
+}
