@@ -107,9 +107,9 @@ macro_rules! learns {
 /// RIME keeps the critics of its exploration, which have to unlearn novelty first: the same bar,
 /// a little later.
 const LATER: &[&str] = &[
-    "training.total_steps=9000",
+    "training.total_steps=13000",
     "feedback.first_step=2000",
-    "feedback.budget=120",
+    "feedback.budget=200",
     "evaluation.every=2000",
 ];
 
