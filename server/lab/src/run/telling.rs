@@ -58,11 +58,9 @@ impl Run {
     }
 
     pub(super) fn finish(&mut self, events: &mut dyn FnMut(Event)) -> Result<Outcome, RunError> {
-        let is_evaluated = self
-            .progress
-            .step
-            .is_multiple_of(self.config.evaluation.every.max(1));
-        if !is_evaluated || self.progress.last_evaluation.is_none() {
+        let (step, every) = (self.progress.step, self.config.evaluation.every);
+        let was_due = step > 0 && every > 0 && step.is_multiple_of(every);
+        if !was_due || self.progress.last_evaluation.is_none() {
             self.evaluate(events)?;
         }
         self.demonstrate(None, events)?;
