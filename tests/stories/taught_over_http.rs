@@ -4,9 +4,9 @@ use serde_json::json;
 
 use super::server_process::{ServerProcess, stair};
 
-/// Share of held-out episodes in which three taught agents succeed, on average at least. Those of a
-/// teacher who answers at random reach 0.02. How far a single one gets hangs on the last bits of
-/// the machine's arithmetic: 0.92 to 1.00 on one kind of processor, 0.12, 0.72 and 1.00 on another.
+/// Share of held-out episodes in which three taught agents succeed, on average at least: far above
+/// the 0.02 of those whose teacher answers at random. How far a single one gets differs between
+/// kinds of processors: 0.92 to 1.00 on one, 0.12, 0.72 and 1.00 on another.
 const LEARNED: f64 = 0.4;
 
 #[test]
