@@ -1,9 +1,14 @@
 //! Where tensors live, and what the process needs before the first one.
 
-use std::sync::Once;
 use std::sync::atomic::{AtomicU8, AtomicU64, Ordering};
+use std::sync::{Once, OnceLock};
+
+use libloading::os::unix::{Library, RTLD_GLOBAL, RTLD_NOW};
 
 use crate::error::LearnError;
+
+/// The libtorch that tch is bound to.
+const LIBTORCH_VERSION: &str = "2.11.0";
 
 /// A place for tensors: the processor or a graphics card.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -31,6 +36,7 @@ impl Device {
                 .map_err(|_| no_device(format!("{index:?} is no number of a card")))?,
             _ => return Err(no_device("devices are `cpu`, `cuda` and `cuda:N`".into())),
         };
+        load_cuda().map_err(no_device)?;
         let n_cards = usize::try_from(tch::Cuda::device_count()).unwrap_or(0);
         if index >= n_cards {
             return Err(no_device(format!(
@@ -39,6 +45,29 @@ impl Device {
         }
         Ok(Self(tch::Device::Cuda(index)))
     }
+}
+
+/// Loads libtorch's part for cards, which executables are not linked with: the slim libtorch of
+/// the set-up has none.
+fn load_cuda() -> Result<(), String> {
+    static LOADED: OnceLock<Result<(), String>> = OnceLock::new();
+    let load = || {
+        // SAFETY: what the library does when it is loaded is to register its kernels with the
+        // libtorch that this process runs on; it is never unloaded.
+        #[expect(unsafe_code, reason = "a library runs its own code when it is loaded")]
+        let library = unsafe { Library::open(Some("libtorch_cuda.so"), RTLD_NOW | RTLD_GLOBAL) };
+        match library {
+            Ok(library) => {
+                std::mem::forget(library);
+                Ok(())
+            }
+            Err(error) => Err(format!(
+                "{error}; name the `torch/lib` folder of a PyTorch {LIBTORCH_VERSION} with CUDA \
+                 in LD_LIBRARY_PATH, or use `cpu`"
+            )),
+        }
+    };
+    LOADED.get_or_init(load).clone()
 }
 
 /// Prepares the process once and every thread that calls it; calling it again does nothing.

@@ -71,8 +71,7 @@ pub(crate) fn bias_activate(z: &mut Tensor, bias: &Tensor, slope: f64) {
             }
         },
         {
-            let sum = &*z + bias;
-            z.copy_(&sum.where_self(&sum.gt(0.0), &(&sum * slope)));
+            *z = activated_tensor((&*z + bias).to_kind(z.kind()), slope);
         }
     );
 }
@@ -111,8 +110,7 @@ pub(crate) fn bias_activate_backward(
             }
         },
         {
-            let scaled = &*gradient * slope;
-            gradient.copy_(&gradient.where_self(&output.gt(0.0), &scaled));
+            *gradient = output.leaky_relu_backward(gradient, slope, true);
             if let Some(sums) = bias_gradient {
                 let own = gradient.sum_dim_intlist([1_i64].as_slice(), true, sums.kind());
                 let _ = sums.g_add_(&own);
@@ -165,14 +163,13 @@ pub(crate) fn norm_activate(
         },
         {
             let sum = &*z + bias;
-            let mean = sum.mean_dim([-1_i64].as_slice(), true, None);
-            let centred = sum - mean;
-            let variance = centred.square().mean_dim([-1_i64].as_slice(), true, None);
-            let inverse = (variance + NORM_EPSILON).rsqrt();
-            z.copy_(&(centred * &inverse));
-            let value = &*z * gain + shift;
-            let output = value.where_self(&value.gt(0.0), &(&value * slope));
-            (output.to_kind(z.kind()), inverse)
+            let columns = columns(&sum) as i64;
+            let (normalised, _mean, inverse) =
+                sum.native_layer_norm([columns], None::<&Tensor>, None, NORM_EPSILON);
+            let output = activated_tensor(shift.addcmul(&normalised, gain), slope);
+            let kind = z.kind();
+            *z = normalised.to_kind(kind);
+            (output.to_kind(kind), inverse)
         }
     )
 }
@@ -243,13 +240,13 @@ pub(crate) fn norm_activate_backward(
             }
         },
         {
-            let scaled = &*gradient * slope;
-            let g = gradient.where_self(&forward.output.gt(0.0), &scaled);
+            let g = forward.output.leaky_relu_backward(gradient, slope, true);
             let rows = [1_i64];
             let d = &g * forward.gain;
             let mean = d.mean_dim([-1_i64].as_slice(), true, None);
             let along = (&d * forward.normalised).mean_dim([-1_i64].as_slice(), true, None);
-            gradient.copy_(&((d - mean - forward.normalised * along) * forward.inverse));
+            let own = (d - mean - forward.normalised * along) * forward.inverse;
+            *gradient = own.to_kind(gradient.kind());
             if let Some(NormGradient { bias, gain, shift }) = into {
                 let sum = |of: &Tensor, kind| of.sum_dim_intlist(rows.as_slice(), true, kind);
                 let _ = shift.g_add_(&sum(&g, shift.kind()));
@@ -304,7 +301,7 @@ pub(crate) fn adam(
             let _ = first.lerp_(&g, 1.0 - decay_1);
             let _ = second.lerp_(&g.square(), 1.0 - decay_2);
             let denominator = second.sqrt() / step.root_correction + epsilon;
-            let _ = parameters.g_sub_(&(&*first / denominator * step.rate));
+            let _ = parameters.addcdiv_(&(&*first * -step.rate), &denominator);
         }
     );
 }
@@ -331,6 +328,18 @@ fn activated<R: Real>(value: R, slope: R) -> R {
         value
     } else {
         slope * value
+    }
+}
+
+/// The activation of a whole tensor, with few launches.
+fn activated_tensor(mut value: Tensor, slope: f64) -> Tensor {
+    if slope == 0.0 {
+        value.relu_()
+    } else if (slope - 1.0).abs() < f64::EPSILON {
+        value
+    } else {
+        let scaled = &value * slope;
+        value.maximum(&scaled)
     }
 }
 

@@ -356,6 +356,31 @@ pub(crate) fn to_vec(tensor: &Tensor) -> Vec<f32> {
     kernel::values::<f32>(&tensor).to_vec()
 }
 
+/// Tensors of one number each, read together, so that a card is waited for once.
+pub(crate) fn read<const N: usize>(numbers: [Tensor; N]) -> [f64; N] {
+    let numbers = numbers.map(|number| number.to_kind(Kind::Double));
+    let together = Tensor::stack(&numbers, 0).to_device(Device::Cpu);
+    let numbers = kernel::values::<f64>(&together);
+    numbers.try_into().expect("each is one number")
+}
+
+/// Blocks of numbers, each as a `[rows × columns]` tensor, moved to the device together: on a
+/// card each transfer costs as much as several layers.
+pub(crate) fn matrices<const N: usize>(
+    blocks: [(&[f32], i64); N],
+    options: (Kind, Device),
+) -> [Tensor; N] {
+    let together = blocks.map(|(values, _)| values).concat();
+    let together = matrix(&together, 1, options);
+    let mut start = 0;
+    blocks.map(|(values, columns)| {
+        let len = values.len() as i64;
+        let block = together.narrow(0, start, len).view([-1, columns]);
+        start += len;
+        block
+    })
+}
+
 /// Numbers as a `[rows × columns]` tensor.
 pub(crate) fn matrix(values: &[f32], columns: i64, options: (Kind, Device)) -> Tensor {
     let rows = values.len() as i64 / columns;

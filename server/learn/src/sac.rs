@@ -8,7 +8,9 @@ use crate::device::Device;
 use crate::error::LearnError;
 use crate::init;
 use crate::kernel;
-use crate::net::{Net, NetShape, Parameters, load_tensor, matrix, save_tensor, to_vec};
+use crate::net::{
+    Net, NetShape, Parameters, load_tensor, matrices, matrix, read, save_tensor, to_vec,
+};
 use crate::replay::Batch;
 
 mod config;
@@ -233,18 +235,22 @@ impl Sac {
         let rows = self.rows(batch);
         let mut rng = Rng::new(self.seed, Stream::Policy, self.n_updates);
         let n = batch.len() as i64;
-        let (next_noise, noise) = (self.noise(n, &mut rng), self.noise(n, &mut rng));
+        let both = self.noise(2 * n, &mut rng);
+        let (next_noise, noise) = (both.narrow(0, 0, n), both.narrow(0, n, n));
         let alpha = self.temperature.alpha();
 
         let target = self.bellman_target(&rows, &next_noise, alpha);
-        let (critic_loss, q_mean) = self.critic_gradient(&rows, &target);
+        let [critic_loss, q_mean] = self.critic_gradient(&rows, &target);
         self.critic.parameters.step_at(self.rate());
-        let (actor_loss, entropy) = self.actor_gradient(&rows, &noise, alpha);
+        let [log_probability, value] = self.actor_gradient(&rows, &noise, alpha);
         self.actor.parameters.step_at(self.rate());
         if let Some(average) = &mut self.average {
             let weight = self.config.actor_ema;
             kernel::lerp(&mut average.values, &self.actor.parameters.values, weight);
         }
+        let [critic_loss, q_mean, log_probability, value] =
+            read([critic_loss, q_mean, log_probability, value]);
+        let (actor_loss, entropy) = (alpha * log_probability - value, -log_probability);
         self.temperature.step(
             alpha * (entropy - self.wanted_entropy()),
             self.rate() * self.config.alpha_learning_rate,
@@ -359,14 +365,21 @@ impl Sac {
 
     fn rows(&self, batch: &Batch) -> Rows {
         let (s, a) = (self.observation_size, self.action_size);
-        let observation = matrix(&batch.observation, s, self.options);
-        let action = matrix(&batch.action, a, self.options);
+        let blocks = [
+            (&batch.observation[..], s),
+            (&batch.action, a),
+            (&batch.next_observation, s),
+            (&batch.reward, 1),
+            (&batch.not_terminal, 1),
+        ];
+        let [observation, action, next_observation, reward, not_terminal] =
+            matrices(blocks, self.options);
         Rows {
             state_action: Tensor::cat(&[&observation, &action], 1),
             observation,
-            next_observation: matrix(&batch.next_observation, s, self.options),
-            reward: matrix(&batch.reward, 1, self.options),
-            not_terminal: matrix(&batch.not_terminal, 1, self.options),
+            next_observation,
+            reward,
+            not_terminal,
         }
     }
 
@@ -389,8 +402,8 @@ impl Sac {
         &rows.reward + &rows.not_terminal * value * self.config.discount
     }
 
-    /// Fills the critics' gradient; returns loss and mean Q.
-    fn critic_gradient(&mut self, rows: &Rows, target: &Tensor) -> (f64, f64) {
+    /// Fills the critics' gradient; returns loss and mean Q, one number each.
+    fn critic_gradient(&mut self, rows: &Rows, target: &Tensor) -> [Tensor; 2] {
         let (q, tape) = self.critic.net.forward_taped(&rows.state_action);
         let error = &q - target;
         let n = target.numel() as f64;
@@ -401,12 +414,11 @@ impl Sac {
             Some(&mut self.critic.gradient),
             None,
         );
-        let loss = error.square().sum(None).double_value(&[]) / n;
-        (loss, q.mean(None).double_value(&[]))
+        [error.square().sum(None) / n, q.mean(None)]
     }
 
-    /// Fills the actor's gradient; returns loss and entropy.
-    fn actor_gradient(&mut self, rows: &Rows, noise: &Tensor, alpha: f64) -> (f64, f64) {
+    /// Fills the actor's gradient; returns mean log π and mean value, one number each.
+    fn actor_gradient(&mut self, rows: &Rows, noise: &Tensor, alpha: f64) -> [Tensor; 2] {
         let (s, a) = (self.observation_size, self.action_size);
         let (output, tape) = self.actor.net.forward_taped(&rows.observation);
         let policy = Gaussian::new(&output, a);
@@ -428,9 +440,7 @@ impl Sac {
         self.actor
             .net
             .backward(&tape, &gradient, Some(&mut self.actor.gradient), None);
-        let entropy = -sample.log_probability.mean(None).double_value(&[]);
-        let loss = -alpha * entropy - value.mean(None).double_value(&[]);
-        (loss, entropy)
+        [sample.log_probability.mean(None), value.mean(None)]
     }
 }
 

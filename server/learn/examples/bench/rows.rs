@@ -56,8 +56,9 @@ fn work(gigaflop: f64, n_repeats: u32, run: impl FnMut() + 'static) -> Work {
 }
 
 /// All rows, in the table's order.
-pub(crate) fn all() -> Vec<Row> {
-    let sac = |name, peer, sizes, config: SacConfig| row(name, peer, move || sac(sizes, &config));
+pub(crate) fn all(device: Device) -> Vec<Row> {
+    let sac =
+        |name, peer, sizes, config: SacConfig| row(name, peer, move || sac(sizes, &config, device));
     let bf16 = |config: SacConfig| SacConfig {
         precision: Precision::Bf16,
         ..config
@@ -111,23 +112,33 @@ pub(crate) fn all() -> Vec<Row> {
         row(
             "temporal-distance step, batch 416",
             "146–517 as released, 35 for its one useful minibatch",
-            temporal,
+            move || temporal(device),
         ),
-        row("unsupervised step, 10,000 rows", "108–683", unsupervised),
-        row("reward training, one epoch of 2,000 pairs", "6,400", || {
-            reward(Precision::F32)
+        row("unsupervised step, 10,000 rows", "108–683", move || {
+            unsupervised(device)
         }),
-        row("– one epoch in bf16", "–", || reward(Precision::Bf16)),
+        row(
+            "reward training, one epoch of 2,000 pairs",
+            "6,400",
+            move || reward(Precision::F32, device),
+        ),
+        row("– one epoch in bf16", "–", move || {
+            reward(Precision::Bf16, device)
+        }),
         row(
             "relabelling 1,000,000 transitions",
             "10,400–12,600",
-            || relabel(Precision::F32),
+            move || relabel(Precision::F32, device),
         ),
-        row("– relabelling in bf16", "–", || {
-            relabel(Precision::Bf16)
+        row("– relabelling in bf16", "–", move || {
+            relabel(Precision::Bf16, device)
         }),
-        row("query selection, 500 candidates", "220–790", selection),
-        row("checkpoint of 500,000 transitions", "cannot", checkpoint),
+        row("query selection, 500 candidates", "220–790", move || {
+            selection(device)
+        }),
+        row("checkpoint of 500,000 transitions", "cannot", move || {
+            checkpoint(device)
+        }),
     ]
 }
 
@@ -139,9 +150,9 @@ fn weights(sizes: &[i64]) -> f64 {
         .sum()
 }
 
-fn sac((s, a): (usize, usize), config: &SacConfig) -> Work {
+fn sac((s, a): (usize, usize), config: &SacConfig, device: Device) -> Work {
     let (batch, hidden) = (config.batch, &config.hidden[..]);
-    let mut sac = Sac::new(config, s, a, 1, Device::CPU);
+    let mut sac = Sac::new(config, s, a, 1, device);
     let rows = random_batch(batch, s, a);
     work(sac_gigaflop((s, a), batch, hidden), 10, move || {
         sac.update(&rows);
@@ -164,9 +175,9 @@ fn sac_gigaflop((s, a): (usize, usize), batch: usize, hidden: &[i64]) -> f64 {
     2e-9 * batch as f64 * products
 }
 
-fn temporal() -> Work {
+fn temporal(device: Device) -> Work {
     let replay = random_replay(8, 500, 1);
-    let mut temporal = TemporalDistance::new(&TemporalConfig::default(), 39, 1, Device::CPU);
+    let mut temporal = TemporalDistance::new(&TemporalConfig::default(), 39, 1, device);
     let trunk = weights(&[39, 256, 256, 256, 64]);
     let heads = weights(&[64, 64, 64]) + 0.5 * weights(&[64, 64, 1]);
     let products = 832.0 * (3.0 * (trunk + heads) - 39.0 * 256.0) + 3.0 * 416.0 * 416.0 * 32.0;
@@ -175,9 +186,9 @@ fn temporal() -> Work {
     })
 }
 
-fn unsupervised() -> Work {
+fn unsupervised(device: Device) -> Work {
     let replay = random_replay(20, 500, 1);
-    let mut sac = Sac::new(&SacConfig::default(), 39, 4, 1, Device::CPU);
+    let mut sac = Sac::new(&SacConfig::default(), 39, 4, 1, device);
     let mut exploration = StateEntropy::new(&ExplorationConfig::default());
     let update = sac_gigaflop((39, 4), 512, &[256; 3]);
     let neighbours = 2e-9 * 512.0 * 10_000.0 * 39.0;
@@ -192,44 +203,50 @@ fn reward_net() -> f64 {
     3.0 * weights(&[43, 256, 256, 256, 1])
 }
 
-fn ensemble(config: &RewardConfig) -> RewardEnsemble {
-    RewardEnsemble::new(config, 39, 4, 1, Device::CPU)
+fn ensemble(config: &RewardConfig, device: Device) -> RewardEnsemble {
+    RewardEnsemble::new(config, 39, 4, 1, device)
 }
 
-fn reward(precision: Precision) -> Work {
+fn reward(precision: Precision, device: Device) -> Work {
     let replay = random_replay(20, 500, 1);
     let label = |query: &Query| Labeled {
         query: *query,
         preference: Preference::Prefer(Which::First),
     };
     let labeled: Vec<Labeled> = random_queries(2_000, 20).iter().map(label).collect();
-    let mut ensemble = ensemble(&RewardConfig {
-        max_epochs: 1,
-        precision,
-        ..RewardConfig::default()
-    });
+    let mut ensemble = ensemble(
+        &RewardConfig {
+            max_epochs: 1,
+            precision,
+            ..RewardConfig::default()
+        },
+        device,
+    );
     let products = 200_000.0 * (3.0 * reward_net() - 3.0 * 43.0 * 256.0);
     work(2e-9 * products, 1, move || {
         ensemble.fit(&replay, &labeled);
     })
 }
 
-fn relabel(precision: Precision) -> Work {
+fn relabel(precision: Precision, device: Device) -> Work {
     let mut replay = random_replay(2_000, 500, 1);
-    let mut ensemble = ensemble(&RewardConfig {
-        precision,
-        ..RewardConfig::default()
-    });
+    let mut ensemble = ensemble(
+        &RewardConfig {
+            precision,
+            ..RewardConfig::default()
+        },
+        device,
+    );
     work(2e-9 * 1e6 * reward_net(), 1, move || {
         ensemble.relabel(&mut replay);
     })
 }
 
-fn selection() -> Work {
+fn selection(device: Device) -> Work {
     let replay = random_replay(100, 500, 1);
     let queries = random_queries(500, 100);
-    let ensemble = ensemble(&RewardConfig::default());
-    let temporal = TemporalDistance::new(&TemporalConfig::default(), 39, 1, Device::CPU);
+    let ensemble = ensemble(&RewardConfig::default(), device);
+    let temporal = TemporalDistance::new(&TemporalConfig::default(), 39, 1, device);
     work(2e-9 * 50_000.0 * reward_net(), 1, move || {
         ensemble.probabilities(&replay, &queries);
         temporal.stage_gap(&replay, &queries);
@@ -237,11 +254,11 @@ fn selection() -> Work {
 }
 
 /// What a run writes after 5,000 further steps, to a temporary folder that goes afterwards.
-fn checkpoint() -> Work {
+fn checkpoint(device: Device) -> Work {
     let mut run = Checkpointed {
         replay: random_replay(1_000, 500, 8),
-        sac: Sac::new(&SacConfig::default(), 39, 4, 1, Device::CPU),
-        ensemble: ensemble(&RewardConfig::default()),
+        sac: Sac::new(&SacConfig::default(), 39, 4, 1, device),
+        ensemble: ensemble(&RewardConfig::default(), device),
         folder: std::env::temp_dir().join(format!("stair-bench-{}", std::process::id())),
     };
     run.write();

@@ -113,14 +113,8 @@ impl Pairwise {
     }
 
     fn apart_backward_by_tensors(&self, pull: &Tensor) -> (Tensor, Tensor) {
-        let sums = |dim: i64| {
-            let own = |k: i64| {
-                let difference = self.x.narrow(1, k, 1) - self.y.narrow(1, k, 1).transpose(0, 1);
-                (difference * pull).sum_dim_intlist([dim].as_slice(), false, None)
-            };
-            Tensor::stack(&(self.half..2 * self.half).map(own).collect::<Vec<_>>(), 1)
-        };
-        (sums(1), sums(0).neg())
+        let push = differences(&self.x, &self.y, self.half) * pull.unsqueeze(-1);
+        sums_over_partners(&push)
     }
 
     fn ahead_backward<T: Real>(&self, slope: &Tensor) -> (Tensor, Tensor) {
@@ -151,14 +145,22 @@ impl Pairwise {
     }
 
     fn ahead_backward_by_tensors(&self, slope: &Tensor) -> (Tensor, Tensor) {
-        let along = |dim: i64| {
-            let own = |k: i64| {
-                (slope * self.which.eq(k as f64)).sum_dim_intlist([dim].as_slice(), false, None)
-            };
-            Tensor::stack(&(0..self.half).map(own).collect::<Vec<_>>(), 1)
-        };
-        (along(1), along(0).neg())
+        let coordinates = Tensor::arange(self.half, (slope.kind(), slope.device()));
+        let is_largest = self.which.unsqueeze(-1).eq_tensor(&coordinates);
+        sums_over_partners(&(slope.unsqueeze(-1) * is_largest))
     }
+}
+
+/// x_i − y_j in each coordinate of one half, from `start` on, `[B × B × D/2]`.
+fn differences(x: &Tensor, y: &Tensor, start: i64) -> Tensor {
+    let half = x.size()[1] / 2;
+    x.narrow(1, start, half).unsqueeze(1) - y.narrow(1, start, half).unsqueeze(0)
+}
+
+/// What pulls each earlier state and, with the other sign, each later one, `[B × D/2]` each.
+fn sums_over_partners(pulls: &Tensor) -> (Tensor, Tensor) {
+    let sum = |dim: i64| pulls.sum_dim_intlist([dim].as_slice(), false, None);
+    (sum(1), sum(0).neg())
 }
 
 /// One coordinate of one earlier state against all later ones: returns Σ_j pull_j (x − y_j) and
@@ -218,21 +220,16 @@ fn forward<T: Real>(x: &Tensor, y: &Tensor, outputs: (&mut Tensor, &mut Tensor, 
     }
 }
 
+/// The same in one pass over all coordinates, where memory is fast and launches are slow.
 fn forward_by_tensors(x: &Tensor, y: &Tensor, outputs: (&mut Tensor, &mut Tensor, &mut Tensor)) {
-    let half = x.size()[1] / 2;
     let (ahead, which, apart) = outputs;
-    let _ = (ahead.zero_(), which.fill_(-1.0), apart.fill_(EPSILON));
-    let difference = |k: i64| x.narrow(1, k, 1) - y.narrow(1, k, 1).transpose(0, 1);
-    for k in 0..half {
-        let difference = difference(k);
-        let is_larger = difference.gt_tensor(ahead);
-        ahead.copy_(&difference.where_self(&is_larger, ahead));
-        let _ = which.masked_fill_(&is_larger, k);
-    }
-    for k in half..2 * half {
-        let _ = apart.g_add_(&difference(k).square());
-    }
-    let _ = apart.sqrt_();
+    let (largest, coordinate) = differences(x, y, 0).max_dim(-1, false);
+    *which = coordinate
+        .to_kind(x.kind())
+        .masked_fill(&largest.le(0.0), -1.0);
+    *ahead = largest.relu();
+    let squares = differences(x, y, x.size()[1] / 2).square();
+    *apart = (squares.sum_dim_intlist([-1_i64].as_slice(), false, None) + EPSILON).sqrt();
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
 use lab::experiment::results::{GridFolder, Provenance};
+use learn::device::Device;
 
 use super::pool::{Pool, Tally};
 use super::{Chosen, processors};
@@ -35,6 +36,9 @@ pub(super) struct Args {
     /// Runs at once [default: one for each processor]
     #[arg(long)]
     jobs: Option<NonZeroUsize>,
+    /// Where all runs learn, cpu or cuda, whatever the file says
+    #[arg(long)]
+    device: Option<String>,
     /// The experiment's folder [default: data/experiments/NAME]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -44,13 +48,20 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
-    let chosen = Chosen::open(&args.file, args.small)?;
+    let mut chosen = Chosen::open(&args.file, args.small)?;
+    if let Some(device) = &args.device {
+        Device::open(device).map_err(BadInput::from_error)?;
+        for run in &mut chosen.grid.runs {
+            run.config.device.clone_from(device);
+        }
+    }
+    let uses_card = chosen.grid.runs.iter().any(|r| r.config.device != "cpu");
     let named = || PathBuf::from("data/experiments").join(&chosen.stem);
     let out = args.out.clone().unwrap_or_else(named);
     let folder = GridFolder::at(&out);
     let provenance = Provenance {
         revision: env!("STAIR_REVISION").into(),
-        machine: machine(),
+        machine: machine(uses_card),
     };
     let revision = (!args.mixed).then_some(provenance.revision.as_str());
     let results = folder.results().map_err(BadInput::from_error)?;
@@ -108,16 +119,33 @@ fn tell(tally: &Tally, out: &std::path::Path) -> ExitCode {
     ExitCode::from(u8::from(!tally.failed.is_empty()))
 }
 
-/// `AMD EPYC 9R45, 2 cores`
-fn machine() -> String {
+/// `AMD EPYC 9R45, 2 cores`, with the graphics cards where runs use them.
+fn machine(uses_card: bool) -> String {
     let cpus = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let model = cpus.lines().find(|line| line.starts_with("model name"));
     let model = model
         .and_then(|line| line.split_once(": "))
         .map(|(_, name)| name.trim());
-    format!(
-        "{}, {} cores",
-        model.unwrap_or("unknown processor"),
-        processors()
-    )
+    let cores = processors();
+    let mut machine = format!("{}, {cores} cores", model.unwrap_or("unknown processor"));
+    if uses_card {
+        for card in cards() {
+            machine.push_str(", ");
+            machine.push_str(&card);
+        }
+    }
+    machine
+}
+
+/// `NVIDIA H100 80GB HBM3`, as the driver tells; none where it does not.
+fn cards() -> Vec<String> {
+    let Ok(folders) = std::fs::read_dir("/proc/driver/nvidia/gpus") else {
+        return Vec::new();
+    };
+    let told = folders.flatten().filter_map(|card| {
+        let told = std::fs::read_to_string(card.path().join("information")).ok()?;
+        let model = told.lines().find_map(|line| line.strip_prefix("Model:"))?;
+        Some(model.trim().to_owned())
+    });
+    told.collect()
 }
