@@ -316,3 +316,18 @@ fn an_expert_that_nobody_wrote_and_a_task_that_is_none_are_named() {
     let few = [watch("door-open"), vec!["--episodes", "1"]].concat();
     expect(&few, here, &["--episodes", "2..=20000"]);
 }
+
+#[test]
+fn nobody_who_reads_on_ends_it_without_a_word() {
+    let (reader, writer) = std::io::pipe().expect("a pipe");
+    drop(reader);
+    let output = stair()
+        .arg("openapi")
+        .stdout(writer)
+        .stderr(Stdio::piped())
+        .spawn()
+        .and_then(std::process::Child::wait_with_output)
+        .expect("stair");
+    assert_eq!(String::from_utf8_lossy(&output.stderr), "");
+    assert_eq!(output.status.code(), Some(141));
+}

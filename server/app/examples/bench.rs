@@ -4,8 +4,7 @@
 //! otherwise, and draws it as the labeling page shows it. Processor time of the process, the
 //! graphics driver's threads included, least of interleaved rounds.
 
-use std::fs;
-
+use cpu_time::ProcessTime;
 use domain::random::{Rng, Stream};
 use domain::scene::{Frame, Scene};
 use render::{CLIP_SIZE, Renderer, clip};
@@ -16,12 +15,12 @@ const N_ROUNDS: usize = 3;
 
 fn main() -> anyhow::Result<()> {
     let wanted: Vec<String> = std::env::args().skip(1).collect();
-    let start = cpu_ms();
+    let start = ProcessTime::now();
     let renderer = Renderer::new()?;
     println!(
         "{}, ready after {:.0} ms CPU\n",
         renderer.device_name(),
-        cpu_ms() - start
+        ms(start)
     );
 
     let mut rows = Vec::new();
@@ -77,13 +76,14 @@ impl Cost {
 }
 
 fn measure(renderer: &Renderer, scene: &Scene, frames: &[Frame]) -> anyhow::Result<Cost> {
-    let before = cpu_ms();
+    let before = ProcessTime::now();
     let images = renderer.draw(scene, frames, CLIP_SIZE, &scene.cameras[0])?;
-    let between = cpu_ms();
+    let drawing = ms(before);
+    let before = ProcessTime::now();
     let clip = clip::encode(&images, clip::frames_per_second(images.len()))?;
     Ok(Cost {
-        drawing: between - before,
-        encoding: cpu_ms() - between,
+        drawing,
+        encoding: ms(before),
         bytes: clip.bytes.len(),
     })
 }
@@ -113,16 +113,7 @@ fn segment(task: &Task) -> anyhow::Result<Vec<Frame>> {
     Ok(frames)
 }
 
-/// Processor time of this process so far, milliseconds, in steps of 10.
-fn cpu_ms() -> f64 {
-    let stat = fs::read_to_string("/proc/self/stat").unwrap_or_default();
-    let after_name = stat.rsplit(')').next().unwrap_or_default();
-    let fields: Vec<f64> = after_name
-        .split_whitespace()
-        .skip(11)
-        .take(2)
-        .filter_map(|f| f.parse().ok())
-        .collect();
-    // The kernel counts these in hundredths of a second on every Linux that Rust runs on.
-    fields.iter().sum::<f64>() * 10.0
+/// Processor time since then, milliseconds.
+fn ms(since: ProcessTime) -> f64 {
+    since.elapsed().as_secs_f64() * 1e3
 }

@@ -103,6 +103,7 @@ fn say(text: &str) -> anyhow::Result<()> {
 /// Parses, runs, and turns errors into a line on stderr and an exit code: 2 for bad input, and for
 /// what a server refuses because it does not fit; 1 for everything else.
 pub fn main() -> ExitCode {
+    end_with_the_reader();
     let result = match Cli::parse().command {
         Command::Serve(args) => serve::run(args),
         Command::Train(args) => train::run(args),
@@ -125,6 +126,22 @@ pub fn main() -> ExitCode {
         let is_bad_input = error.is::<BadInput>() || is_refused;
         ExitCode::from(if is_bad_input { 2 } else { 1 })
     })
+}
+
+/// What a shell says of a program that its reader's end has ended: 128 + SIGPIPE.
+const NO_READER: i32 = 141;
+
+/// Where nobody reads any longer (`stair … | head`), the program ends without a word. The signal
+/// itself would also end a server whose browser has gone.
+fn end_with_the_reader() {
+    let usual = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        let told = panic.payload_as_str().unwrap_or_default();
+        if told.starts_with("failed printing to stdout") && told.contains("Broken pipe") {
+            std::process::exit(NO_READER);
+        }
+        usual(panic);
+    }));
 }
 
 #[cfg(test)]

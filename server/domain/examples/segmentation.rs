@@ -1,8 +1,8 @@
 //! CPU time of cutting one trajectory into stages.
 //!
-//! `cargo run --release -p domain --example segmentation` prints the least of several rounds, long
-//! enough for the coarse clock that Linux keeps of a thread.
+//! `cargo run --release -p domain --example segmentation` prints the least of several rounds.
 
+use cpu_time::ThreadTime;
 use domain::random::{Rng, Stream};
 use domain::stage::{StageProbabilities, best_segmentation};
 
@@ -17,19 +17,12 @@ fn main() {
         let table = StageProbabilities::new(values.collect(), n_stages).expect("probabilities");
         let mut least = f64::INFINITY;
         for _ in 0..N_ROUNDS {
-            let before = cpu_seconds();
+            let before = ThreadTime::now();
             for _ in 0..N_REPEATS {
                 std::hint::black_box(best_segmentation(std::hint::black_box(&table)));
             }
-            least = least.min((cpu_seconds() - before) / f64::from(N_REPEATS));
+            least = least.min(before.elapsed().as_secs_f64() / f64::from(N_REPEATS));
         }
         println!("{n_states:6}  {n_stages:6}  {:13.4}", 1e3 * least);
     }
-}
-
-/// CPU time of this thread, seconds (Linux).
-fn cpu_seconds() -> f64 {
-    let line = std::fs::read_to_string("/proc/thread-self/schedstat").expect("Linux keeps it");
-    let nanoseconds = line.split(' ').next().and_then(|n| n.parse::<f64>().ok());
-    1e-9 * nanoseconds.expect("its first number is the time on a processor")
 }

@@ -10,6 +10,7 @@ use std::fs;
 use std::sync::mpsc::channel;
 use std::time::Instant;
 
+use cpu_time::ProcessTime;
 use domain::environment::{EnvError, Environment};
 use domain::random::{Rng, Stream};
 use domain::teacher::{Oracle, Scripted};
@@ -127,7 +128,7 @@ fn run(sample: &Sample) -> Result<(u64, f64, f64), Box<dyn std::error::Error>> {
         if let Event::SessionClosed(session) = &event
             && session.session == 0
         {
-            since = Some((session.step, Instant::now(), cpu_seconds()));
+            since = Some((session.step, Instant::now(), ProcessTime::now()));
         }
     });
     let _ = fs::remove_dir_all(&folder); // best effort: it is a temporary folder
@@ -136,20 +137,6 @@ fn run(sample: &Sample) -> Result<(u64, f64, f64), Box<dyn std::error::Error>> {
     Ok((
         run.step() - step,
         wall.elapsed().as_secs_f64(),
-        cpu_seconds() - cpu,
+        cpu.elapsed().as_secs_f64(),
     ))
-}
-
-/// Processor time of this process so far, seconds.
-fn cpu_seconds() -> f64 {
-    let stat = fs::read_to_string("/proc/self/stat").unwrap_or_default();
-    let after_name = stat.rsplit(')').next().unwrap_or_default();
-    let fields: Vec<f64> = after_name
-        .split_whitespace()
-        .skip(11)
-        .take(2)
-        .filter_map(|f| f.parse().ok())
-        .collect();
-    // The kernel counts these in hundredths of a second on every Linux that Rust runs on.
-    fields.iter().sum::<f64>() / 100.0
 }

@@ -4,8 +4,7 @@
 //! Each task plays whole episodes, resets and the policy's own cost included, once with random
 //! actions and once with its expert's, if it has one: contacts make the second one slower.
 
-use std::fs;
-
+use cpu_time::ThreadTime;
 use domain::random::{Rng, Stream};
 use sim::tasks::{Task, tasks};
 
@@ -24,7 +23,7 @@ fn main() {
                 .collect()
         });
         let expert = task.expert.map_or_else(
-            || "-".into(),
+            || "–".into(),
             |mut expert| format!("{:.0}", steps_per_second(task, seconds, &mut expert)),
         );
         println!("{:<18} {random:>14.0}   {expert:>14}", task.name);
@@ -33,7 +32,7 @@ fn main() {
 
 fn steps_per_second(task: &Task, seconds: f64, policy: &mut dyn FnMut(&[f32]) -> Vec<f32>) -> f64 {
     let mut environment = (task.make)();
-    let (start, mut n_steps, mut seed) = (cpu_seconds(), 0_u32, 0);
+    let (start, mut n_steps, mut seed) = (ThreadTime::now(), 0_u32, 0);
     loop {
         let mut observation = environment.reset(seed);
         for _ in 0..environment.spec().episode_len {
@@ -44,17 +43,9 @@ fn steps_per_second(task: &Task, seconds: f64, policy: &mut dyn FnMut(&[f32]) ->
             n_steps += 1;
         }
         seed += 1;
-        let spent = cpu_seconds() - start;
+        let spent = start.elapsed().as_secs_f64();
         if spent >= seconds {
             return f64::from(n_steps) / spent;
         }
     }
-}
-
-/// CPU time of this thread, from the first field of Linux's `schedstat`, which counts
-/// nanoseconds; other work on the machine does not enter it.
-fn cpu_seconds() -> f64 {
-    let text = fs::read_to_string("/proc/thread-self/schedstat").expect("Linux counts CPU time");
-    let nanoseconds = text.split_whitespace().next().expect("three numbers");
-    nanoseconds.parse::<f64>().expect("a number") * 1e-9
 }

@@ -16,9 +16,9 @@
 mod experience;
 mod rows;
 
-use std::sync::LazyLock;
 use std::time::Instant;
 
+use cpu_time::ThreadTime;
 use learn::device::Device;
 use rows::{Row, Work};
 
@@ -34,10 +34,10 @@ fn main() {
         eprintln!("{error}");
         std::process::exit(2);
     });
-    let now = if device == Device::CPU {
-        cpu_time
+    let seconds = if device == Device::CPU {
+        cpu_seconds
     } else {
-        wall_time
+        wall_seconds
     };
     let is_wanted =
         |name: &str| wanted.is_empty() || wanted.iter().any(|w| name.contains(w.as_str()));
@@ -50,15 +50,13 @@ fn main() {
             (row, work, f64::INFINITY)
         })
         .collect();
-    let mut product = product_of_1024(now);
+    let mut product = product_of_1024();
     let mut fastest_product = f64::INFINITY;
     for _ in 0..N_ROUNDS {
         fastest_product = fastest_product.min(product());
         for (_, work, least) in &mut timed {
-            let before = now();
-            (0..work.n_repeats).for_each(|_| (work.run)());
-            let seconds = (now() - before) / f64::from(work.n_repeats);
-            *least = least.min(seconds);
+            let all = seconds(&mut || (0..work.n_repeats).for_each(|_| (work.run)()));
+            *least = least.min(all / f64::from(work.n_repeats));
         }
     }
     let rate = 2.0 * 1.024_f64.powi(3) / fastest_product; // GF/s
@@ -66,12 +64,17 @@ fn main() {
         "1024³ f32 product: {rate:.0} GF/s; MKL asked its switch {} times\n",
         learn::device::n_mkl_switch_calls()
     );
-    let clock = if device == Device::CPU {
-        "CPU ms"
+    tell(device, timed, rate);
+}
+
+/// Milliseconds beside the floor; on a card, beside what one core takes at best.
+fn tell(device: Device, timed: Vec<(Row, Work, f64)>, rate: f64) {
+    let columns = if device == Device::CPU {
+        "CPU ms | floor ms | share"
     } else {
-        "ms"
+        "ms | a core's floor ms | times as fast"
     };
-    println!("| what | {clock} | floor ms | share | peer ms |\n|---|---|---|---|---|");
+    println!("| what | {columns} | peer ms |\n|---|---|---|---|---|");
     for (row, work, least) in timed {
         let (ms, floor) = (least * 1e3, work.gigaflop / rate * 1e3);
         let (floor, share) = if work.gigaflop > 0.0 {
@@ -86,8 +89,8 @@ fn main() {
     }
 }
 
-/// Seconds of one 1024³ product on the processor, as libtorch multiplies.
-fn product_of_1024(now: fn() -> f64) -> impl FnMut() -> f64 {
+/// Seconds of CPU time of one 1024³ product, as libtorch multiplies.
+fn product_of_1024() -> impl FnMut() -> f64 {
     let numbers = (tch::Kind::Float, tch::Device::Cpu);
     let (a, b) = (
         tch::Tensor::ones([1024, 1024], numbers),
@@ -96,33 +99,24 @@ fn product_of_1024(now: fn() -> f64) -> impl FnMut() -> f64 {
     let c = tch::Tensor::zeros([1024, 1024], numbers);
     move || {
         let time = |_| {
-            let before = now();
-            let _ = a.matmul_out(&c, &b);
-            now() - before
+            cpu_seconds(&mut || {
+                let _ = a.matmul_out(&c, &b);
+            })
         };
         (0..10).map(time).fold(f64::INFINITY, f64::min)
     }
 }
 
-/// Seconds since the first call.
-fn wall_time() -> f64 {
-    static BEGAN: LazyLock<Instant> = LazyLock::new(Instant::now);
-    BEGAN.elapsed().as_secs_f64()
+/// Seconds of CPU time of this thread that the work takes.
+fn cpu_seconds(work: &mut dyn FnMut()) -> f64 {
+    let before = ThreadTime::now();
+    work();
+    before.elapsed().as_secs_f64()
 }
 
-/// Seconds of CPU time that this thread has used.
-#[expect(
-    unsafe_code,
-    reason = "the thread's own clock is read through a C function"
-)]
-fn cpu_time() -> f64 {
-    const CLOCK_THREAD_CPUTIME_ID: i32 = 3;
-    unsafe extern "C" {
-        fn clock_gettime(clock: i32, time: *mut [i64; 2]) -> i32;
-    }
-    let mut time = [0_i64; 2];
-    // SAFETY: on 64-bit Linux a timespec is two 64-bit numbers, which it fills.
-    let failed = unsafe { clock_gettime(CLOCK_THREAD_CPUTIME_ID, &raw mut time) };
-    assert_eq!(failed, 0, "the thread's clock can be read");
-    time[0] as f64 + 1e-9 * time[1] as f64
+/// Seconds of wall time that it takes.
+fn wall_seconds(work: &mut dyn FnMut()) -> f64 {
+    let before = Instant::now();
+    work();
+    before.elapsed().as_secs_f64()
 }
