@@ -69,14 +69,14 @@ impl Learner {
         }
     }
 
-    /// Does the due updates on a second thread while `simulate` and the temporal distance run
-    /// on this one. All of them read the replay as it was before, so the result does not
-    /// depend on who is faster.
-    pub(crate) fn work<S, R>(
+    /// Does the due updates beside `simulate` and the temporal distance, on two threads of the
+    /// present rayon pool; whichever is done first helps the other's networks along. All of them
+    /// read the replay as it was before, so the result does not depend on who is faster.
+    pub(crate) fn work<S: Send, R: Send>(
         &mut self,
         due: &Due,
         replay: &Replay,
-        simulate: impl FnOnce(&RewardEnsemble) -> (S, R),
+        simulate: impl FnOnce(&RewardEnsemble) -> (S, R) + Send,
     ) -> (Updates, S, R) {
         let n_updates_before = self.agent.n_updates();
         let Self {
@@ -105,26 +105,19 @@ impl Learner {
                 })
                 .collect()
         };
-        let (updates, steps, rewards) = std::thread::scope(|scope| {
-            let updating = (due.n_updates > 0).then(|| scope.spawn(update_agent));
+        let go_on = move || {
+            learn::device::init();
             let (steps, rewards) = simulate(reward);
-            let temporal = match temporal {
+            let temporal: Vec<_> = match temporal {
                 Some(temporal) => (0..due.n_temporal)
                     .filter_map(|_| temporal.update(replay))
                     .collect(),
                 None => Vec::new(),
             };
-            let agent = updating.map(|thread| {
-                thread
-                    .join()
-                    .unwrap_or_else(|panic| std::panic::resume_unwind(panic))
-            });
-            let updates = Updates {
-                agent: agent.unwrap_or_default(),
-                temporal,
-            };
-            (updates, steps, rewards)
-        });
+            (steps, rewards, temporal)
+        };
+        let (agent, (steps, rewards, temporal)) = rayon::join(update_agent, go_on);
+        let updates = Updates { agent, temporal };
         if due.is_exploring {
             self.warm_start(n_updates_before, replay);
         }

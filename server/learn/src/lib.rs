@@ -2,8 +2,8 @@
 //! to tell the step from the state.
 //!
 //! Invariants: the only crate that touches tensors; randomness only from [`domain::random`], keyed
-//! by (seed, stream, step), so that every learner resumes bit for bit from what it saves; one
-//! thread per learner; a task reward reaches a learner only through
+//! by (seed, stream, step), so that every learner resumes bit for bit from what it saves, on
+//! any number of threads; a task reward reaches a learner only through
 //! [`replay::RewardSource::Task`], the upper bound's own road.
 
 #![expect(
@@ -29,6 +29,7 @@ mod init;
 mod kernel;
 mod net;
 mod precision;
+mod threads;
 
 pub use error::LearnError;
 pub use precision::Precision;

@@ -1,6 +1,7 @@
 //! Stacked multilayer perceptrons whose weights are views of one flat vector.
 //!
-//! Members that share a shape are computed together; Adam, averaging, saving and loading see
+//! Members that share a shape are computed together on a card, side by side on the processor's
+//! threads; Adam, averaging, saving and loading see
 //! the flat vector only. The way back is written out, because autograd's bookkeeping and its
 //! temporaries cost as much as a third of an update at these sizes.
 
@@ -13,6 +14,7 @@ use crate::checkpoint::Archive;
 use crate::error::LearnError;
 use crate::kernel::{self, NormGradient, Normed};
 use crate::precision::{Precision, add_outer, product};
+use crate::threads::{self, Readable, Reading, WORTH_A_THREAD};
 
 mod tangent;
 
@@ -96,17 +98,136 @@ impl Layer {
 /// A stack of perceptrons (or, over another vector, the gradients of one).
 #[derive(Debug)]
 pub(crate) struct Net {
+    stack: Stack,
+    /// Each member alone, where they are worked on side by side.
+    members: Vec<Stack>,
+}
+
+/// What a forward pass leaves for the way back: of all members together, or of each.
+#[derive(Debug)]
+pub(crate) struct Tape(Vec<StackTape>);
+
+impl Net {
+    /// Views of `flat` from `offset` on.
+    pub(crate) fn over(shape: &NetShape, flat: &Tensor, offset: i64) -> Self {
+        let stack = Stack::over(shape, flat, offset);
+        let is_apart = shape.n_members > 1 && flat.device() == Device::Cpu;
+        let n_apart = if is_apart { shape.n_members } else { 0 };
+        let members = (0..n_apart).map(|member| stack.member(member)).collect();
+        Self { stack, members }
+    }
+
+    /// From the input on.
+    pub(crate) fn layers(&self) -> &[Layer] {
+        &self.stack.layers
+    }
+
+    /// The same to be filled.
+    pub(crate) fn layers_mut(&mut self) -> &mut [Layer] {
+        &mut self.stack.layers
+    }
+
+    /// For negative numbers.
+    pub(crate) fn slope(&self) -> f64 {
+        self.stack.slope
+    }
+
+    /// Outputs `[E × B × out]` for inputs `[B × in]`, shared by the members, or `[E × B × in]`.
+    pub(crate) fn forward(&self, input: &Tensor) -> Tensor {
+        if !self.is_worth_threads(input) {
+            return self.stack.run(input, |_| ()).0;
+        }
+        let parts = self.parts(input);
+        let outputs = threads::each(parts, |(member, input)| member.run(&input, |_| ()).0);
+        Tensor::cat(&outputs, 0)
+    }
+
+    /// The same, keeping what the way back needs.
+    pub(crate) fn forward_taped(&self, input: &Tensor) -> (Tensor, Tape) {
+        if !self.is_worth_threads(input) {
+            let (output, tape) = self.stack.run_taped(input);
+            return (output, Tape(vec![tape]));
+        }
+        let parts = self.parts(input);
+        let done = threads::each(parts, |(member, input)| member.run_taped(&input));
+        let (outputs, tapes): (Vec<_>, Vec<_>) = done.into_iter().unzip();
+        (Tensor::cat(&outputs, 0), Tape(tapes))
+    }
+
+    /// The way back. Adds the weights' gradients to `into`, and returns the gradient of the
+    /// input's `columns`, `[E × B × columns]`, where they are asked for.
+    pub(crate) fn backward(
+        &self,
+        tape: &Tape,
+        output_gradient: &Tensor,
+        into: Option<&mut Net>,
+        columns: Option<Range<i64>>,
+    ) -> Option<Tensor> {
+        if let [tape] = &tape.0[..] {
+            let into = into.map(|net| &mut net.stack);
+            return self.stack.backward(tape, output_gradient, into, columns);
+        }
+        let into: Vec<Option<&mut Stack>> = match into {
+            Some(net) => net.members.iter_mut().map(Some).collect(),
+            None => self.members.iter().map(|_| None).collect(),
+        };
+        let parts = self.members.iter().zip(&tape.0).zip(into).enumerate();
+        let parts = parts.map(|(index, ((member, tape), into))| {
+            let own = output_gradient.narrow(0, index as i64, 1);
+            (Reading(member), Reading(tape), own, into)
+        });
+        let gradients = threads::each(parts.collect(), |(member, tape, own, into)| {
+            member.backward(&tape, &own, into, columns.clone())
+        });
+        let gradients: Option<Vec<Tensor>> = gradients.into_iter().collect();
+        Some(Tensor::cat(&gradients?, 0))
+    }
+
+    /// Whether members are worked on side by side.
+    fn is_worth_threads(&self, input: &Tensor) -> bool {
+        !self.members.is_empty() && self.is_worth_a_thread(input)
+    }
+
+    /// Whether a pass of one member takes long enough. A card has threads of its own.
+    pub(crate) fn is_worth_a_thread(&self, input: &Tensor) -> bool {
+        let n_rows = input.size()[input.dim() - 2];
+        let products = self.stack.layers.iter().map(|layer| {
+            let size = layer.weight.size();
+            size[1] * size[2]
+        });
+        input.device() == Device::Cpu && n_rows * products.sum::<i64>() >= WORTH_A_THREAD
+    }
+
+    /// Each member with its input.
+    fn parts(&self, input: &Tensor) -> Vec<(Reading<'_, Stack>, Tensor)> {
+        let own = |member: usize| match input.dim() {
+            2 => input.shallow_clone(),
+            _ => input.narrow(0, member as i64, 1),
+        };
+        let members = self.members.iter().enumerate();
+        members
+            .map(|(i, member)| (Reading(member), own(i)))
+            .collect()
+    }
+}
+
+/// Members that are multiplied together.
+#[derive(Debug)]
+struct Stack {
     layers: Vec<Layer>,
     slope: f64,
     precision: Precision,
 }
 
-/// What a forward pass leaves for the way back.
+impl Readable for Stack {}
+
 #[derive(Debug)]
-pub(crate) struct Tape {
+struct StackTape {
     input: Tensor,
     hidden: Vec<Hidden>,
 }
+
+impl Readable for StackTape {}
 
 #[derive(Debug)]
 struct Hidden {
@@ -115,9 +236,8 @@ struct Hidden {
     normed: Option<(Tensor, Tensor)>,
 }
 
-impl Net {
-    /// Views of `flat` from `offset` on.
-    pub(crate) fn over(shape: &NetShape, flat: &Tensor, offset: i64) -> Self {
+impl Stack {
+    fn over(shape: &NetShape, flat: &Tensor, offset: i64) -> Self {
         let mut offset = offset;
         let mut view = |size: [i64; 3]| {
             let len = size.iter().product();
@@ -142,21 +262,27 @@ impl Net {
         }
     }
 
-    /// From the input on.
-    pub(crate) fn layers_mut(&mut self) -> &mut [Layer] {
-        &mut self.layers
+    /// One member, views of the same numbers.
+    fn member(&self, member: i64) -> Self {
+        let own = |tensor: &Tensor| tensor.narrow(0, member, 1);
+        let layer = |layer: &Layer| Layer {
+            weight: own(&layer.weight),
+            bias: own(&layer.bias),
+            norm: layer.norm.as_ref().map(|norm| Norm {
+                gain: own(&norm.gain),
+                shift: own(&norm.shift),
+            }),
+        };
+        Self {
+            layers: self.layers.iter().map(layer).collect(),
+            ..*self
+        }
     }
 
-    /// Outputs `[E × B × out]` for inputs `[B × in]`, shared by the members, or `[E × B × in]`.
-    pub(crate) fn forward(&self, input: &Tensor) -> Tensor {
-        self.run(input, |_| ()).0
-    }
-
-    /// The same, keeping what the way back needs.
-    pub(crate) fn forward_taped(&self, input: &Tensor) -> (Tensor, Tape) {
+    fn run_taped(&self, input: &Tensor) -> (Tensor, StackTape) {
         let mut hidden = Vec::with_capacity(self.layers.len() - 1);
         let (output, input) = self.run(input, |h| hidden.push(h));
-        (output, Tape { input, hidden })
+        (output, StackTape { input, hidden })
     }
 
     fn run(&self, input: &Tensor, mut keep: impl FnMut(Hidden)) -> (Tensor, Tensor) {
@@ -203,18 +329,16 @@ impl Net {
         }
     }
 
-    /// The way back. Adds the weights' gradients to `into`, and returns the gradient of the
-    /// input's `columns`, `[E × B × columns]`, where they are asked for.
-    pub(crate) fn backward(
+    fn backward(
         &self,
-        tape: &Tape,
+        tape: &StackTape,
         output_gradient: &Tensor,
-        mut into: Option<&mut Net>,
+        mut into: Option<&mut Stack>,
         columns: Option<Range<i64>>,
     ) -> Option<Tensor> {
         let mut gradient = self.precision.operand(output_gradient);
         for (index, layer) in self.layers.iter().enumerate().rev() {
-            let mut into = into.as_deref_mut().map(|net| &mut net.layers[index]);
+            let mut into = into.as_deref_mut().map(|stack| &mut stack.layers[index]);
             if let Some(hidden) = tape.hidden.get(index) {
                 self.activation_backward(&mut gradient, hidden, layer, into.as_deref_mut());
             } else if let Some(into) = &mut into {
@@ -386,4 +510,53 @@ pub(crate) fn matrix(values: &[f32], columns: i64, options: (Kind, Device)) -> T
     let rows = values.len() as i64 / columns;
     let tensor = Tensor::from_slice(values).view([rows, columns]);
     tensor.to_kind(options.0).to_device(options.1)
+}
+
+#[cfg(test)]
+mod tests {
+    use domain::random::{Rng, Stream};
+
+    use super::*;
+
+    fn normals(size: &[i64], step: u64) -> Tensor {
+        let mut values = vec![0.0; size.iter().product::<i64>() as usize];
+        Rng::new(3, Stream::Test, step).fill_normal(&mut values);
+        let values: Vec<f64> = values.into_iter().map(f64::from).collect();
+        Tensor::from_slice(&values).view(size)
+    }
+
+    fn close(a: &Tensor, b: &Tensor) {
+        assert_eq!(a.size(), b.size());
+        assert!((a - b).abs().max().double_value(&[]) < 1e-10);
+    }
+
+    #[test]
+    fn members_side_by_side_compute_what_they_do_together() {
+        let shape = NetShape {
+            layer_norm: true,
+            ..NetShape::new(3, 40, &[200, 200], 2)
+        };
+        let flat = normals(&[shape.n_values()], 0);
+        let net = Net::over(&shape, &flat, 0);
+        for input in [normals(&[120, 40], 1), normals(&[3, 120, 40], 2)] {
+            assert!(net.is_worth_threads(&input));
+            let (output, tape) = net.forward_taped(&input);
+            let (together, tape_together) = net.stack.run_taped(&input);
+            close(&output, &together);
+            close(&net.forward(&input), &together);
+
+            let gradients = [flat.zeros_like(), flat.zeros_like()];
+            let [mut own, mut own_together] = gradients
+                .each_ref()
+                .map(|gradient| Net::over(&shape, gradient, 0));
+            let slope = normals(&[3, 120, 2], 3);
+            let of_input = net.backward(&tape, &slope, Some(&mut own), Some(5..9));
+            let into = Some(&mut own_together.stack);
+            let of_input_together = net.stack.backward(&tape_together, &slope, into, Some(5..9));
+            close(&of_input.unwrap(), &of_input_together.unwrap());
+            close(&gradients[0], &gradients[1]);
+            let without = net.backward(&tape, &slope, None, Some(0..40));
+            assert_eq!(without.unwrap().size(), [3, 120, 40]);
+        }
+    }
 }

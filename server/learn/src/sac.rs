@@ -9,9 +9,10 @@ use crate::error::LearnError;
 use crate::init;
 use crate::kernel;
 use crate::net::{
-    Net, NetShape, Parameters, load_tensor, matrices, matrix, read, save_tensor, to_vec,
+    Net, NetShape, Parameters, Tape, load_tensor, matrices, matrix, read, save_tensor, to_vec,
 };
 use crate::replay::Batch;
+use crate::threads::{self, Readable, Reading};
 
 mod config;
 mod outer;
@@ -131,6 +132,17 @@ struct Rows {
     not_terminal: Tensor,
 }
 
+impl Readable for Sac {}
+impl Readable for Rows {}
+
+/// Outputs, and what the way back needs.
+struct Passes {
+    /// Of the critics on the batch.
+    critic: (Tensor, Tape),
+    /// Of the actor on its states.
+    actor: (Tensor, Tape),
+}
+
 impl Sac {
     /// Fresh weights that follow from `seed`.
     pub fn new(
@@ -239,10 +251,10 @@ impl Sac {
         let (next_noise, noise) = (both.narrow(0, 0, n), both.narrow(0, n, n));
         let alpha = self.temperature.alpha();
 
-        let target = self.bellman_target(&rows, &next_noise, alpha);
-        let [critic_loss, q_mean] = self.critic_gradient(&rows, &target);
+        let (target, passes) = self.passes(&rows, &next_noise, alpha);
+        let [critic_loss, q_mean] = self.critic_gradient(passes.critic, &target);
         self.critic.parameters.step_at(self.rate());
-        let [log_probability, value] = self.actor_gradient(&rows, &noise, alpha);
+        let [log_probability, value] = self.actor_gradient(&rows, passes.actor, &noise, alpha);
         self.actor.parameters.step_at(self.rate());
         if let Some(average) = &mut self.average {
             let weight = self.config.actor_ema;
@@ -389,6 +401,20 @@ impl Sac {
         matrix(&noise, self.action_size, self.options)
     }
 
+    /// What both gradients start from, as all nets are before the update: the critics' target, and
+    /// the passes to go back through.
+    fn passes(&self, rows: &Rows, next_noise: &Tensor, alpha: f64) -> (Tensor, Passes) {
+        let (me, rows, noise) = (Reading(self), Reading(rows), Reading(next_noise));
+        threads::both(
+            self.actor.net.is_worth_a_thread(&rows.observation),
+            || me.bellman_target(&rows, &noise, alpha),
+            || Passes {
+                critic: me.critic.net.forward_taped(&rows.state_action),
+                actor: me.actor.net.forward_taped(&rows.observation),
+            },
+        )
+    }
+
     /// `[B × 1]`.
     fn bellman_target(&self, rows: &Rows, noise: &Tensor, alpha: f64) -> Tensor {
         let policy = Gaussian::new(
@@ -403,8 +429,7 @@ impl Sac {
     }
 
     /// Fills the critics' gradient; returns loss and mean Q, one number each.
-    fn critic_gradient(&mut self, rows: &Rows, target: &Tensor) -> [Tensor; 2] {
-        let (q, tape) = self.critic.net.forward_taped(&rows.state_action);
+    fn critic_gradient(&mut self, (q, tape): (Tensor, Tape), target: &Tensor) -> [Tensor; 2] {
         let error = &q - target;
         let n = target.numel() as f64;
         self.critic.parameters.zero_gradient();
@@ -418,9 +443,14 @@ impl Sac {
     }
 
     /// Fills the actor's gradient; returns mean log π and mean value, one number each.
-    fn actor_gradient(&mut self, rows: &Rows, noise: &Tensor, alpha: f64) -> [Tensor; 2] {
+    fn actor_gradient(
+        &mut self,
+        rows: &Rows,
+        (output, tape): (Tensor, Tape),
+        noise: &Tensor,
+        alpha: f64,
+    ) -> [Tensor; 2] {
         let (s, a) = (self.observation_size, self.action_size);
-        let (output, tape) = self.actor.net.forward_taped(&rows.observation);
         let policy = Gaussian::new(&output, a);
         let sample = policy.sample(noise);
         let state_action = Tensor::cat(&[&rows.observation, &sample.action], 1);

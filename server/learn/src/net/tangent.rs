@@ -10,10 +10,10 @@ impl Net {
     /// the same shape over another vector. The inner product of this with any output gradient is
     /// that of the weights' gradient with the direction.
     pub(crate) fn tangent(&self, input: &Tensor, direction: &Net) -> Tensor {
-        let mut x = self.expanded(input);
+        let mut x = self.stack.expanded(input);
         let mut dx: Option<Tensor> = None;
-        let last = self.layers.len() - 1;
-        for (index, (layer, along)) in self.layers.iter().zip(&direction.layers).enumerate() {
+        let last = self.layers().len() - 1;
+        for (index, (layer, along)) in self.layers().iter().zip(direction.layers()).enumerate() {
             let mut dz = x.bmm(&along.weight) + &along.bias;
             if let Some(dx) = &dx {
                 let _ = dz.g_add_(&dx.bmm(&layer.weight));
@@ -31,7 +31,7 @@ impl Net {
                 z = rows * &norm.gain + &norm.shift;
             }
             let is_positive = z.gt(0.0).to_kind(z.kind());
-            let slope = is_positive * (1.0 - self.slope) + self.slope;
+            let slope = is_positive * (1.0 - self.slope()) + self.slope();
             x = z * &slope;
             dx = Some(dz * slope);
         }

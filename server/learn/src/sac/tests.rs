@@ -108,9 +108,9 @@ fn the_written_out_gradients_are_autograds() {
         let target = (&rows.reward + &rows.not_terminal * value * config.discount).detach();
         let q = reference_forward(&critic_shape, &critic, &rows.state_action);
         let loss = (&q - &target).square().mean(None) * 2.0;
-        let ours = sac.bellman_target(&rows, &next_noise, alpha);
+        let (ours, passes) = sac.passes(&rows, &next_noise, alpha);
         assert!(largest_relative_error(&ours, &target) < 1e-9);
-        let [critic_loss, _] = sac.critic_gradient(&rows, &ours);
+        let [critic_loss, _] = sac.critic_gradient(passes.critic, &ours);
         let critic_loss = critic_loss.double_value(&[]);
         assert!((critic_loss - loss.double_value(&[])).abs() < 1e-9);
         loss.backward();
@@ -125,7 +125,7 @@ fn the_written_out_gradients_are_autograds() {
         let pair = Tensor::cat(&[&rows.observation, &action], 1);
         let q = reference_forward(&critic_shape, &sac.critic.parameters.values, &pair);
         let loss = (log_probability * alpha - q.amin([0_i64].as_slice(), false)).mean(None);
-        let [log, value] = sac.actor_gradient(&rows, &noise, alpha);
+        let [log, value] = sac.actor_gradient(&rows, passes.actor, &noise, alpha);
         let actor_loss = alpha * log.double_value(&[]) - value.double_value(&[]);
         assert!((actor_loss - loss.double_value(&[])).abs() < 1e-9);
         loss.backward();
@@ -156,9 +156,9 @@ fn first_gradients(config: &SacConfig) -> [Tensor; 2] {
     });
     let noise = |sac: &Sac, step| sac.noise(n as i64, &mut Rng::new(1, Stream::Test, step));
     let (next_noise, noise) = (noise(&sac, 1), noise(&sac, 2));
-    let target = sac.bellman_target(&rows, &next_noise, 0.1);
-    let _ = sac.critic_gradient(&rows, &target);
-    let _ = sac.actor_gradient(&rows, &noise, 0.1);
+    let (target, passes) = sac.passes(&rows, &next_noise, 0.1);
+    let _ = sac.critic_gradient(passes.critic, &target);
+    let _ = sac.actor_gradient(&rows, passes.actor, &noise, 0.1);
     [&sac.critic, &sac.actor].map(|net| net.parameters.gradient.copy())
 }
 
@@ -365,5 +365,30 @@ fn the_learning_rates_fall_in_a_straight_line() {
     for (done, share) in [(0.5, 0.6), (1.0, 0.2), (3.0, 0.2)] {
         // Adam's first step is its rate times the gradient's sign
         assert!((moved(done) / whole - share).abs() < 1e-3, "{done}");
+    }
+}
+
+#[test]
+fn the_number_of_threads_changes_no_bit() {
+    let config = SacConfig {
+        hidden: vec![200, 200],
+        batch: 150,
+        layer_norm: true,
+        ..SacConfig::default()
+    };
+    let weights = |n_threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads);
+        pool.build().expect("threads").install(|| {
+            let mut sac = Sac::new(&config, 5, 3, 3, Device::CPU);
+            for step in 0..4 {
+                sac.update(&batch(150, step));
+            }
+            let nets = [&sac.critic, &sac.actor].map(|net| to_vec(&net.parameters.values));
+            nets.concat()
+        })
+    };
+    let alone = weights(1);
+    for n_threads in [2, 3, 5] {
+        assert_eq!(weights(n_threads), alone, "{n_threads} threads");
     }
 }
