@@ -243,6 +243,9 @@ fn an_experiment_that_does_not_fit_is_named_with_its_line() {
     grid("name.toml", "[\"stiar\"]");
     grid("empty.toml", "[]");
     let run = |file| ["experiment", "run", file];
+    let on_tpu = ["experiment", "run", "go-fetch-return", "--device", "tpu"];
+    expect(&on_tpu, here, &["tpu", "cpu", "cuda"]);
+    assert!(!here.join("data").exists(), "nothing is written");
     expect(
         &run("name.toml"),
         here,

@@ -331,7 +331,7 @@ fn activated<R: Real>(value: R, slope: R) -> R {
     }
 }
 
-/// The activation of a whole tensor, with few launches.
+/// The activation of a whole tensor with few launches, for a slope in [0, 1].
 fn activated_tensor(mut value: Tensor, slope: f64) -> Tensor {
     if slope == 0.0 {
         value.relu_()

@@ -13,11 +13,7 @@ pub(crate) const WORTH_A_THREAD: i64 = 5_000_000;
 /// Does each part; results come in the order of the parts.
 pub(crate) fn each<P: Send, R: Send>(parts: Vec<P>, work: impl Fn(P) -> R + Sync) -> Vec<R> {
     let parts = parts.into_par_iter().with_max_len(1);
-    let done = parts.map(|part| {
-        crate::device::init();
-        work(part)
-    });
-    done.collect()
+    parts.map(|part| prepared(|| work(part))).collect()
 }
 
 /// Does both, side by side where that is worth it.
@@ -26,14 +22,17 @@ pub(crate) fn both<A: Send, B: Send>(
     a: impl FnOnce() -> A + Send,
     b: impl FnOnce() -> B + Send,
 ) -> (A, B) {
-    if !is_worth_it {
-        return (a(), b());
+    if is_worth_it {
+        rayon::join(|| prepared(a), || prepared(b))
+    } else {
+        (a(), b())
     }
-    let b = || {
-        crate::device::init();
-        b()
-    };
-    rayon::join(a, b)
+}
+
+/// Does it on a thread of the pool, which may never have computed with tensors before.
+fn prepared<R>(work: impl FnOnce() -> R) -> R {
+    crate::device::init();
+    work()
 }
 
 /// What holds nothing but tensors and plain numbers, and changes neither through a shared
