@@ -100,12 +100,8 @@ fn fits(config: &RunConfig, spec: &EnvSpec, learner: &dyn RewardLearner) -> f64 
     let warm_rows = n_exploring * f64::from(learner.warm_start_steps()) * config.agent.batch as f64;
     let mut total = 3.0 * row * warm_rows;
     let mut labels = 0;
-    for session in 0.. {
-        let step = feedback.step_of(session);
-        if step >= t.total_steps || labels >= feedback.budget {
-            break;
-        }
-        labels += feedback.session_size(labels);
+    for (step, size) in feedback.sessions(t.total_steps) {
+        labels += size;
         let ways = learner.ways_through(reward.max_epochs);
         total += row * (ways * rows_per_label * f64::from(labels) + step as f64);
     }

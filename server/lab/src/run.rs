@@ -209,10 +209,11 @@ impl Run {
     ) -> Result<(), RunError> {
         let index = self.progress.n_sessions;
         self.demonstrate(Some(index), events)?;
-        let size = self
-            .config
-            .feedback
-            .session_size(self.preferences.n_preferred());
+        let size = self.config.feedback.session_size(
+            index,
+            self.config.training.total_steps,
+            self.preferences.n_preferred(),
+        );
         let queries = &self.config.queries;
         let mut rng = Rng::new(self.config.seed, Stream::Candidates, u64::from(index));
         let n_candidates = (size * queries.candidates_per_query) as usize;
@@ -264,7 +265,7 @@ impl Run {
     /// Pairs that nobody is asked about, for methods that learn from them too.
     fn unlabeled(&self, session: u32) -> Vec<Query> {
         let per_query = self.learner.unlabeled_per_query();
-        let n = per_query * self.config.feedback.queries_per_session;
+        let n = per_query * self.full_size(session);
         let mut rng = Rng::new(self.config.seed, Stream::Unlabeled, u64::from(session));
         self.pool().draw(&self.replay, n as usize, &mut rng)
     }
@@ -409,8 +410,16 @@ impl Run {
     /// A session's worth of the newest answers.
     fn latest_answers(&self) -> Vec<Labeled> {
         let mut labeled = self.preferences.labeled(self.config.queries.train_on_equal);
-        let n = self.config.feedback.queries_per_session as usize;
+        let n = self.full_size(self.progress.n_sessions.saturating_sub(1)) as usize;
         labeled.split_off(labeled.len().saturating_sub(n))
+    }
+
+    /// Queries of session `index`, whatever is left of the budget.
+    fn full_size(&self, index: u32) -> u32 {
+        let config = &self.config;
+        config
+            .feedback
+            .full_size(index, config.training.total_steps)
     }
 }
 
