@@ -96,3 +96,13 @@ fn mrn_steers_every_n_steps_by_the_latest_session_until_its_budget_is_spent() {
     let pebble = Trained::new("pebble", &[]);
     assert!(pebble.run.steering(399, 400).is_none());
 }
+
+#[test]
+fn decreasing_sessions_ask_less_as_the_run_goes_on() {
+    let trained = Trained::new("pebble", &["feedback.session_sizes=decreasing"]);
+    let run = &trained.run;
+    // 4, then 4 · 250/700 and 4 · 100/700, rounded down to one at least
+    assert_eq!(run.progress.n_sessions, 3);
+    assert_eq!(run.preferences.labeled(true).len(), 6);
+    assert_eq!(run.latest_answers(), run.preferences.labeled(true)[5..]);
+}
