@@ -31,7 +31,7 @@
 //!
 //! Differs from the original: the arm never brushes the lock while an episode is set up. Contacts
 //! do not creep, so that a hand that leans on the turned lever leaves it turned, where there it
-//! slips in after some seconds and pushes the lever back: the expert's return is a fifth higher.
+//! slips in after some seconds and pushes the lever back: the expert's return is some 15 % higher.
 //! See also `robots::sawyer_hand` and `tasks::assembly`.
 //! Source: METAWORLD.md 3.5 and 1.9, METAWORLD_EXPERTS.md.
 
