@@ -33,7 +33,7 @@ pub enum SessionSizes {
 }
 
 impl SessionSizes {
-    /// Factor on M at step `t` of `total`, above 0.
+    /// Factor on M at step `t` of `total`; `Decreasing` reaches 0 at its end.
     fn factor(self, t: u64, total: u64) -> f64 {
         let (total, left) = (total as f64, total.saturating_sub(t) as f64);
         match self {
@@ -69,7 +69,7 @@ impl FeedbackSchedule {
     }
 
     /// Queries of session `index` in a run of `total_steps`, whatever is left of the budget: M in
-    /// the first, later at least one.
+    /// the first, later at least one and at most the whole budget.
     ///
     /// Differs from B-Pref: t is the step at which the session is due, also if it had to wait.
     pub fn full_size(&self, index: u32, total_steps: u64) -> u32 {
@@ -78,7 +78,7 @@ impl FeedbackSchedule {
         }
         let factor = self.session_sizes.factor(self.step_of(index), total_steps);
         let size = f64::from(self.queries_per_session) * factor;
-        (size as u32).max(1) // rounded down, as there; what is too large saturates
+        (size as u32).min(self.budget).max(1) // rounded down, as there
     }
 
     /// Queries that session `index` may ask with `n_answers` of the budget spent.
@@ -163,6 +163,7 @@ mod tests {
         assert_eq!(schedule.full_size(12, 160_000), 152); // 80 · 160,000/84,001
         assert_eq!(schedule.full_size(25, 160_000), 2_132); // 80 · 160,000/6,001
         schedule.budget = 200;
+        assert_eq!(schedule.full_size(25, 160_000), 200);
         let sizes: Vec<_> = schedule.sessions(160_000).map(|(_, size)| size).collect();
         assert_eq!(sizes, [80, 85, 35]);
     }
