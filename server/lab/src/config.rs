@@ -471,6 +471,7 @@ mod tests {
             "queries.near_policy_episodes=0",
             "agent.actor_ema=1.5",
             "agent.final_rate=0.0",
+            "reward.final_rate=0.0",
             "agent.final_entropy=0.5",
             "teacher.mistake=1.5",
             "teacher.discount=0.0",

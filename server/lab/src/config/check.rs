@@ -171,6 +171,7 @@ impl RunConfig {
             ("reward.learning_rate", r.learning_rate),
             ("reward.temperature", r.temperature),
         ])?;
+        shares_above_0([("reward.final_rate", r.final_rate)])?;
         not_zero([("reward.max_epochs", u64::from(r.max_epochs))])?;
         not_negative([("reward.normalized_std", r.normalized_std)])?;
         shares([("reward.stop_accuracy", f64::from(r.stop_accuracy))])?;

@@ -18,6 +18,9 @@ pub struct RewardConfig {
     ///
     /// Differs from the paper: its table says 1e-4, the released code uses 3e-4.
     pub learning_rate: f64,
+    /// Share of the rate that is left in a fit's last pass, falling evenly from the first, in
+    /// (0, 1]; 1 keeps it constant, as the released code does.
+    pub final_rate: f64,
     /// Pairs in a minibatch.
     pub batch: usize,
     /// Passes over all preferences after a session, at most.
@@ -54,6 +57,7 @@ impl Default for RewardConfig {
             members: 3,
             hidden: vec![256; 3],
             learning_rate: 3e-4,
+            final_rate: 1.0,
             batch: 128,
             max_epochs: 10,
             stop_accuracy: 0.97,
@@ -66,6 +70,12 @@ impl Default for RewardConfig {
 }
 
 impl RewardConfig {
+    /// Share of the rate in one of a fit's passes, counted from 0, of at most `max_epochs`.
+    pub(super) fn rate_in(&self, epoch: u32) -> f64 {
+        let last = self.max_epochs.saturating_sub(1).max(1);
+        1.0 + f64::from(epoch) / f64::from(last) * (self.final_rate - 1.0)
+    }
+
     /// All members, for states and actions of so many numbers.
     pub(super) fn shape(&self, sizes: (usize, usize)) -> NetShape {
         let columns = (sizes.0 + sizes.1) as i64;

@@ -163,7 +163,7 @@ impl RewardLearner for Denoising {
         for epoch in 0..ensemble.config.max_epochs {
             let verdicts = self.judge(&ensemble.divergences(lesson));
             let believed = believed(lesson.labeled, &verdicts);
-            let rate = self.rate();
+            let rate = self.rate() * ensemble.config.rate_in(epoch);
             self.n_epochs += 1;
             if !believed.is_empty() {
                 let passes = ensemble.epoch(lesson.replay, &believed, rate);

@@ -79,8 +79,9 @@ impl RewardEnsemble {
         if labeled.is_empty() {
             return fit;
         }
-        for n_epochs in 1..=self.config.max_epochs {
-            fit = summary(&self.epoch(replay, labeled, 1.0), n_epochs);
+        for epoch in 0..self.config.max_epochs {
+            let rate = self.config.rate_in(epoch);
+            fit = summary(&self.epoch(replay, labeled, rate), epoch + 1);
             if fit.accuracy > self.config.stop_accuracy {
                 break;
             }

@@ -200,6 +200,40 @@ fn fitting_stops_when_the_members_are_right_often_enough() {
 }
 
 #[test]
+fn a_fits_rate_falls_evenly_to_its_last_pass() {
+    let replay = replay(20);
+    let labeled = labeled(&replay, 40, |_| 5);
+    let rates = |final_rate: f64, max_epochs: u32| {
+        let config = RewardConfig {
+            final_rate,
+            max_epochs,
+            ..small()
+        };
+        (0..max_epochs)
+            .map(|e| config.rate_in(e))
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(rates(0.5, 3), [1.0, 0.75, 0.5]);
+    assert_eq!((rates(0.5, 1), rates(1.0, 2)), (vec![1.0], vec![1.0, 1.0]));
+    let fitted = |final_rate: f64, max_epochs: u32| {
+        let config = RewardConfig {
+            final_rate,
+            max_epochs,
+            stop_accuracy: 1.0,
+            ..small()
+        };
+        let mut ensemble = RewardEnsemble::new(&config, 3, 2, 1, Device::CPU);
+        let fit = ensemble.fit(&replay, &labeled);
+        assert_eq!(fit.n_epochs, max_epochs);
+        f64::from(ensemble.predict(&[0.3, -0.2, 0.5], &[0.1, 0.4])[0])
+    };
+    let (once, twice) = (fitted(1.0, 1), fitted(1.0, 2));
+    let moved = (twice - once).abs();
+    assert!(moved > 1e-4, "{once} {twice}");
+    assert!((fitted(1e-3, 2) - once).abs() < 0.05 * moved);
+}
+
+#[test]
 fn an_interrupted_ensemble_goes_on_bit_for_bit() {
     let replay = replay(6);
     let labeled = labeled(&replay, 40, |_| 5);
