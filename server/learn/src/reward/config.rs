@@ -18,8 +18,8 @@ pub struct RewardConfig {
     ///
     /// Differs from the paper: its table says 1e-4, the released code uses 3e-4.
     pub learning_rate: f64,
-    /// Share of the rate that is left in a fit's last pass, falling evenly from the first, in
-    /// (0, 1]; 1 keeps it constant, as the released code does.
+    /// Share of the rate that is left at the end of a fit that takes all its passes, falling
+    /// evenly from its start, in (0, 1]; 1 keeps it constant, as the released code does.
     pub final_rate: f64,
     /// Pairs in a minibatch.
     pub batch: usize,
@@ -70,10 +70,10 @@ impl Default for RewardConfig {
 }
 
 impl RewardConfig {
-    /// Share of the rate in one of a fit's passes, counted from 0, of at most `max_epochs`.
-    pub(super) fn rate_in(&self, epoch: u32) -> f64 {
-        let last = self.max_epochs.saturating_sub(1).max(1);
-        1.0 + f64::from(epoch) / f64::from(last) * (self.final_rate - 1.0)
+    /// Share of the rate in part `index` of a fit's `n` (passes or minibatches), from 0.
+    pub(super) fn rate_in(&self, index: usize, n: usize) -> f64 {
+        let done = index as f64 / n.saturating_sub(1).max(1) as f64;
+        1.0 + done * (self.final_rate - 1.0)
     }
 
     /// All members, for states and actions of so many numbers.

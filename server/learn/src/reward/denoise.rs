@@ -160,10 +160,12 @@ impl RewardLearner for Denoising {
         if lesson.labeled.is_empty() {
             return fit;
         }
-        for epoch in 0..ensemble.config.max_epochs {
+        let max_epochs = ensemble.config.max_epochs;
+        for epoch in 0..max_epochs {
             let verdicts = self.judge(&ensemble.divergences(lesson));
             let believed = believed(lesson.labeled, &verdicts);
-            let rate = self.rate() * ensemble.config.rate_in(epoch);
+            let falling = ensemble.config.rate_in(epoch as usize, max_epochs as usize);
+            let rate = self.rate() * falling;
             self.n_epochs += 1;
             if !believed.is_empty() {
                 let passes = ensemble.epoch(lesson.replay, &believed, rate);

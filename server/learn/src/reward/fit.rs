@@ -79,8 +79,9 @@ impl RewardEnsemble {
         if labeled.is_empty() {
             return fit;
         }
-        for epoch in 0..self.config.max_epochs {
-            let rate = self.config.rate_in(epoch);
+        let max_epochs = self.config.max_epochs;
+        for epoch in 0..max_epochs {
+            let rate = self.config.rate_in(epoch as usize, max_epochs as usize);
             fit = summary(&self.epoch(replay, labeled, rate), epoch + 1);
             if fit.accuracy > self.config.stop_accuracy {
                 break;
@@ -136,11 +137,12 @@ impl RewardEnsemble {
         }
     }
 
-    /// One Adam step on examples `[M][n]`; returns their logits before it.
-    pub(super) fn step(&mut self, replay: &Replay, examples: &[Example]) -> Vec<f64> {
+    /// One Adam step on examples `[M][n]`, at a share of the learning rate; returns their logits
+    /// before it.
+    pub(super) fn step(&mut self, replay: &Replay, examples: &[Example], rate: f64) -> Vec<f64> {
         self.parameters.zero_gradient();
         let logits = self.add_gradient(replay, examples);
-        self.parameters.step();
+        self.parameters.step_at(rate);
         logits
     }
 

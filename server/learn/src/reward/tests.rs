@@ -209,8 +209,8 @@ fn a_fits_rate_falls_evenly_to_its_last_pass() {
             max_epochs,
             ..small()
         };
-        (0..max_epochs)
-            .map(|e| config.rate_in(e))
+        (0..max_epochs as usize)
+            .map(|epoch| config.rate_in(epoch, max_epochs as usize))
             .collect::<Vec<_>>()
     };
     assert_eq!(rates(0.5, 3), [1.0, 0.75, 0.5]);
