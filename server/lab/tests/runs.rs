@@ -358,12 +358,16 @@ fn a_checkpoint_of_other_settings_is_refused_and_kept() {
     assert_eq!((run.config().device.as_str(), complaints), ("cpu", vec![]));
 }
 
-/// The small task from some ninety answers: the oracle's teach it, a coin's do not.
+/// The small task from some seventy answers: the oracle's teach it, a coin's do not.
 #[test]
 fn answers_teach_the_task_and_a_coin_does_not() {
     let task_return = |teacher: &str| {
         let folder = Folder::new(teacher);
-        let settings = ["evaluation.every=0", "training.total_steps=28000"];
+        let settings = [
+            "evaluation.every=0",
+            "training.total_steps=28000",
+            "feedback.every=2500",
+        ];
         let mut run = Run::start(resolve("stair", &["quick"], &settings), &folder.0).unwrap();
         finished(
             drive(
