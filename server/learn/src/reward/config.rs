@@ -70,10 +70,10 @@ impl Default for RewardConfig {
 }
 
 impl RewardConfig {
-    /// Share of the rate in part `index` of a fit's `n` (passes or minibatches), from 0.
-    pub(super) fn rate_in(&self, index: usize, n: usize) -> f64 {
-        let done = index as f64 / n.saturating_sub(1).max(1) as f64;
-        1.0 + done * (self.final_rate - 1.0)
+    /// Share of the rate in each of a fit's `n` passes or minibatches.
+    pub(super) fn rates(&self, n: usize) -> impl Iterator<Item = f64> + use<> {
+        let (left, last) = (self.final_rate, n.saturating_sub(1).max(1) as f64);
+        (0..n).map(move |index| 1.0 + index as f64 / last * (left - 1.0))
     }
 
     /// All members, for states and actions of so many numbers.

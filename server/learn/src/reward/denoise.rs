@@ -160,11 +160,10 @@ impl RewardLearner for Denoising {
         if lesson.labeled.is_empty() {
             return fit;
         }
-        let max_epochs = ensemble.config.max_epochs;
-        for epoch in 0..max_epochs {
+        let rates = ensemble.config.rates(ensemble.config.max_epochs as usize);
+        for (epoch, falling) in (0..).zip(rates) {
             let verdicts = self.judge(&ensemble.divergences(lesson));
             let believed = believed(lesson.labeled, &verdicts);
-            let falling = ensemble.config.rate_in(epoch as usize, max_epochs as usize);
             let rate = self.rate() * falling;
             self.n_epochs += 1;
             if !believed.is_empty() {

@@ -79,10 +79,9 @@ impl RewardEnsemble {
         if labeled.is_empty() {
             return fit;
         }
-        let max_epochs = self.config.max_epochs;
-        for epoch in 0..max_epochs {
-            let rate = self.config.rate_in(epoch as usize, max_epochs as usize);
-            fit = summary(&self.epoch(replay, labeled, rate), epoch + 1);
+        let rates = self.config.rates(self.config.max_epochs as usize);
+        for (n_epochs, rate) in (1..).zip(rates) {
+            fit = summary(&self.epoch(replay, labeled, rate), n_epochs);
             if fit.accuracy > self.config.stop_accuracy {
                 break;
             }

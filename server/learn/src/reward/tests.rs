@@ -203,18 +203,15 @@ fn fitting_stops_when_the_members_are_right_often_enough() {
 fn a_fits_rate_falls_evenly_to_its_last_pass() {
     let replay = replay(20);
     let labeled = labeled(&replay, 40, |_| 5);
-    let rates = |final_rate: f64, max_epochs: u32| {
+    let rates = |final_rate: f64, n: usize| {
         let config = RewardConfig {
             final_rate,
-            max_epochs,
             ..small()
         };
-        (0..max_epochs as usize)
-            .map(|epoch| config.rate_in(epoch, max_epochs as usize))
-            .collect::<Vec<_>>()
+        config.rates(n).collect::<Vec<_>>()
     };
     assert_eq!(rates(0.5, 3), [1.0, 0.75, 0.5]);
-    assert_eq!((rates(0.5, 1), rates(1.0, 2)), (vec![1.0], vec![1.0, 1.0]));
+    assert_eq!((rates(0.5, 1), rates(1.0, 2)), (vec![1.0], vec![1.0; 2]));
     let fitted = |final_rate: f64, max_epochs: u32| {
         let config = RewardConfig {
             final_rate,
@@ -231,6 +228,37 @@ fn a_fits_rate_falls_evenly_to_its_last_pass() {
     let moved = (twice - once).abs();
     assert!(moved > 1e-4, "{once} {twice}");
     assert!((fitted(1e-3, 2) - once).abs() < 0.05 * moved);
+}
+
+#[test]
+fn every_way_to_fit_comes_to_rest() {
+    let replay = replay(20);
+    let labeled = labeled(&replay, 40, |_| 10);
+    let lesson = Lesson {
+        replay: &replay,
+        labeled: &labeled,
+        unlabeled: &[],
+    };
+    let fitters: [fn() -> Box<dyn RewardLearner>; 3] = [
+        || Box::new(Supervised),
+        || Box::new(Denoising::new(&DenoisingConfig::default(), 1)),
+        || Box::new(SemiSupervised::new(&SemiSupervisedConfig::default(), 1)),
+    ];
+    for (index, fitter) in fitters.iter().enumerate() {
+        let loss = |final_rate: f64| {
+            let config = RewardConfig {
+                final_rate,
+                learning_rate: 3e-3,
+                max_epochs: 12,
+                stop_accuracy: 1.0,
+                ..small()
+            };
+            let mut ensemble = RewardEnsemble::new(&config, 3, 2, 1, Device::CPU);
+            fitter().fit(&mut ensemble, &lesson).loss
+        };
+        // it has moved less
+        assert!(loss(0.01) > loss(1.0), "{index}");
+    }
 }
 
 #[test]
