@@ -463,6 +463,27 @@ mod tests {
     }
 
     #[test]
+    fn a_value_of_the_wrong_kind_is_told_what_to_write_instead() {
+        for (bad, wanted) in [
+            ("agent.discount=high", "expected a number"),
+            (
+                "agent.batch=1.5",
+                "number `1.5`, expected a whole number, 0 or more",
+            ),
+            ("agent.batch=-1", "expected a whole number, 0 or more"),
+            ("agent.layer_norm=1", "expected true or false"),
+            ("agent.hidden=3", "expected a list, as in [256, 256]"),
+            ("queries.sampler=3", "expected text in quotes"),
+            ("agent=3", "expected a table of settings"),
+        ] {
+            let told = RunConfig::resolve(&layers(&[], &[bad])).unwrap_err();
+            let told = told.to_string();
+            assert!(told.starts_with(&format!("--set {bad}: ")), "{told}");
+            assert!(told.ends_with(wanted), "{told}");
+        }
+    }
+
+    #[test]
     fn a_value_out_of_range_or_of_the_wrong_kind_is_refused() {
         for bad in [
             "environment.n_envs=0",

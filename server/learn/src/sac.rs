@@ -242,7 +242,7 @@ impl Sac {
     /// One update of critics, actor, temperature and (every few) target, in this order.
     ///
     /// Source: BPref's `update`; targets y = r + γ (min Q̄(s′, a′) − α log π(a′|s′)) where
-    /// anything follows.
+    /// anything follows; without the last term where [`SacConfig::backup_entropy`] says so.
     pub fn update(&mut self, batch: &Batch) -> SacMetrics {
         let rows = self.rows(batch);
         let mut rng = Rng::new(self.seed, Stream::Policy, self.n_updates);
@@ -424,7 +424,11 @@ impl Sac {
         let sample = policy.sample(noise);
         let state_action = Tensor::cat(&[&rows.next_observation, &sample.action], 1);
         let (value, _) = self.target.forward(&state_action).min_dim(0, false);
-        let value = value - sample.log_probability * alpha;
+        let value = if self.config.backup_entropy {
+            value - sample.log_probability * alpha
+        } else {
+            value
+        };
         &rows.reward + &rows.not_terminal * value * self.config.discount
     }
 

@@ -66,7 +66,7 @@ impl RunConfig {
             .try_into()
             .map_err(|e: toml::de::Error| ConfigError::Invalid {
                 origin: "settings".into(),
-                message: e.message().to_owned(),
+                message: plainly(e.message()),
             })?;
         config.check()?;
         Ok(config)
@@ -100,7 +100,8 @@ fn parse_override(text: &str) -> Result<Table, ConfigError> {
 pub(crate) fn invalid(origin: &str, text: &str, error: &toml::de::Error) -> ConfigError {
     let line = error
         .span()
-        .map(|span| 1 + text[..span.start.min(text.len())].matches('\n').count());
+        .map(|span| 1 + text[..span.start.min(text.len())].matches('\n').count())
+        .filter(|_| text.contains('\n'));
     let place = line
         .map(|line| format!("line {line}: "))
         .unwrap_or_default();
@@ -116,8 +117,27 @@ pub(crate) fn invalid(origin: &str, text: &str, error: &toml::de::Error) -> Conf
         .unwrap_or_default();
     ConfigError::Invalid {
         origin: origin.into(),
-        message: format!("{place}{message}{suggestion}"),
+        message: format!("{place}{}{suggestion}", plainly(message)),
     }
+}
+
+/// A message of serde's with the names of Rust's types put as what a person would write.
+fn plainly(message: &str) -> String {
+    let Some((found, expected)) = message.rsplit_once("expected ") else {
+        return message.into();
+    };
+    let wanted = match expected {
+        "f32" | "f64" => "a number",
+        "u8" | "u16" | "u32" | "u64" | "usize" => "a whole number, 0 or more",
+        "i8" | "i16" | "i32" | "i64" | "isize" => "a whole number",
+        "a boolean" => "true or false",
+        "a sequence" => "a list, as in [256, 256]",
+        "a string" => "text in quotes",
+        _ if expected.starts_with("struct ") => "a table of settings",
+        _ => return message.into(),
+    };
+    let found = found.replace("floating point", "number");
+    format!("{found}expected {wanted}")
 }
 
 pub(super) fn merge(base: &mut Table, layer: &Table) {

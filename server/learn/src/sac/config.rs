@@ -50,6 +50,12 @@ pub struct SacConfig {
     /// task reward success holds better with −3, and on go-fetch-return's learned one; on
     /// window-open's, which still moves, no gain was seen.
     pub final_entropy: f64,
+    /// Whether the critics' targets hold α's bonus for chance, as SAC's and the released code's do.
+    ///
+    /// Without it chance still spreads each action, but no state is worth more for the chance that
+    /// it allows: where actions do nothing, as beside a jammed window, that bonus costs nothing and
+    /// can outweigh what the task pays elsewhere.
+    pub backup_entropy: bool,
     /// Whether the critics' hidden layers are normalised; the released code's are not. With it,
     /// higher learning rates hold.
     pub layer_norm: bool,
@@ -72,6 +78,7 @@ impl Default for SacConfig {
             actor_ema: 0.0,
             final_rate: 1.0,
             final_entropy: FIRST_ENTROPY,
+            backup_entropy: true,
             layer_norm: false,
             precision: Precision::F32,
         }

@@ -343,6 +343,32 @@ fn the_entropy_that_is_wanted_goes_in_a_straight_line() {
     }
 }
 
+/// The next state's bonus for chance is α's, discounted, and nothing where nothing follows.
+#[test]
+fn targets_hold_the_bonus_for_chance_only_where_it_is_wanted() {
+    let targets = |backup_entropy: bool, alpha: f64| {
+        let config = SacConfig {
+            backup_entropy,
+            ..small(false)
+        };
+        let sac = Sac::new(&config, SIZES.0, SIZES.1, 3, Device::CPU);
+        let rows = sac.rows(&batch(20, 0));
+        let noise = sac.noise(20, &mut Rng::new(6, Stream::Test, 0));
+        let policy = Gaussian::new(&sac.actor.net.forward(&rows.next_observation), 3);
+        let bonus = policy.sample(&noise).log_probability * (-alpha * config.discount);
+        (
+            sac.bellman_target(&rows, &noise, alpha),
+            bonus * rows.not_terminal,
+        )
+    };
+    let (none, _) = targets(true, 0.0);
+    assert_eq!(to_vec(&targets(false, 0.3).0), to_vec(&none));
+    let (with, bonus) = targets(true, 0.3);
+    let off = (with - none - &bonus).abs().max().double_value(&[]);
+    assert!(off < 1e-6, "{off}");
+    assert!(bonus.abs().max().double_value(&[]) > 0.1);
+}
+
 #[test]
 fn the_learning_rates_fall_in_a_straight_line() {
     let config = SacConfig {
