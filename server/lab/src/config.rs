@@ -98,11 +98,20 @@ impl Default for RunConfig {
 pub struct EnvironmentConfig {
     /// Environments stepped side by side; 1 is the paper's.
     pub n_envs: usize,
+    /// Steps after which an episode of training ends, as at a time limit; 0 leaves it to the task,
+    /// as the paper does. Trials are always as long as the task's.
+    ///
+    /// An agent that has solved a task early spends the rest of an episode where it is done.
+    /// Shorter episodes show it more beginnings.
+    pub episode_len: u32,
 }
 
 impl Default for EnvironmentConfig {
     fn default() -> Self {
-        Self { n_envs: 1 }
+        Self {
+            n_envs: 1,
+            episode_len: 0,
+        }
     }
 }
 
@@ -310,6 +319,14 @@ impl RunConfig {
         }
     }
 
+    /// Steps in an episode of training: the setting, where the task's own is not shorter.
+    pub fn episode_len(&self, spec: &domain::environment::EnvSpec) -> u32 {
+        match self.environment.episode_len {
+            0 => spec.episode_len,
+            n_steps => n_steps.min(spec.episode_len),
+        }
+    }
+
     /// The first setting in which two trees differ that decides what a checkpoint holds, with
     /// its value here and there.
     pub(crate) fn first_misfit(&self, other: &Self) -> Option<(&'static str, String, String)> {
@@ -487,6 +504,7 @@ mod tests {
     fn a_value_out_of_range_or_of_the_wrong_kind_is_refused() {
         for bad in [
             "environment.n_envs=0",
+            "environment.episode_len=5",
             "queries.same_stage_fraction=1.5",
             "queries.sampler=disagrement",
             "queries.near_policy_episodes=0",

@@ -1,10 +1,12 @@
 //! The environments of a run, stepped side by side.
 
-use domain::environment::{EnvError, EnvSpec, Environment, Step};
+use domain::environment::{EnvError, Environment, EpisodeEnd, Step};
 use domain::random::{Rng, Stream};
 use learn::replay::{NewStep, Replay};
 use learn::reward::Estimate;
 use serde::{Deserialize, Serialize};
+
+use crate::config::RunConfig;
 
 /// Environments and the states they are in.
 pub(crate) struct Lanes {
@@ -12,6 +14,10 @@ pub(crate) struct Lanes {
     observations: Vec<f32>,
     observation_size: usize,
     action_size: usize,
+    /// Steps after which an episode ends, if the task does not end it before.
+    episode_len: u32,
+    /// Steps that each environment's episode has behind it.
+    n_steps: Vec<u32>,
     seed: u64,
     n_episodes: u64,
 }
@@ -21,14 +27,17 @@ pub(crate) struct Lanes {
 pub(crate) struct LanesState {
     snapshots: Vec<Vec<u8>>,
     observations: Vec<f32>,
+    /// Empty where an older program wrote it, whose episodes only the task ended.
+    #[serde(default)]
+    n_steps: Vec<u32>,
     n_episodes: u64,
 }
 
 impl Lanes {
     /// `n` environments, each at the start of an episode that the replay knows.
-    pub(crate) fn start(task: &sim::tasks::Task, n: usize, seed: u64, replay: &mut Replay) -> Self {
-        let spec = (task.spec)();
-        let mut lanes = Self::unstarted(task, &spec, n, seed);
+    pub(crate) fn start(task: &sim::tasks::Task, config: &RunConfig, replay: &mut Replay) -> Self {
+        let n = config.environment.n_envs;
+        let mut lanes = Self::unstarted(task, n, config);
         for lane in 0..n {
             lanes.begin_episode(lane, replay);
         }
@@ -41,14 +50,17 @@ impl Lanes {
     /// When a snapshot is of another task or version.
     pub(crate) fn restore(
         task: &sim::tasks::Task,
-        seed: u64,
+        config: &RunConfig,
         state: LanesState,
     ) -> Result<Self, EnvError> {
-        let spec = (task.spec)();
-        let mut lanes = Self::unstarted(task, &spec, state.snapshots.len(), seed);
+        let n = state.snapshots.len();
+        let mut lanes = Self::unstarted(task, n, config);
         for (env, snapshot) in lanes.envs.iter_mut().zip(&state.snapshots) {
             env.reset(0);
             env.restore(snapshot)?;
+        }
+        if state.n_steps.len() == n {
+            lanes.n_steps = state.n_steps;
         }
         Ok(Self {
             observations: state.observations,
@@ -57,13 +69,16 @@ impl Lanes {
         })
     }
 
-    fn unstarted(task: &sim::tasks::Task, spec: &EnvSpec, n: usize, seed: u64) -> Self {
+    fn unstarted(task: &sim::tasks::Task, n: usize, config: &RunConfig) -> Self {
+        let spec = (task.spec)();
         Self {
             envs: (0..n).map(|_| (task.make)()).collect(),
             observations: vec![0.0; n * spec.observation_size],
             observation_size: spec.observation_size,
             action_size: spec.action_size,
-            seed,
+            episode_len: config.episode_len(&spec),
+            n_steps: vec![0; n],
+            seed: config.seed,
             n_episodes: 0,
         }
     }
@@ -73,6 +88,7 @@ impl Lanes {
         LanesState {
             snapshots: self.envs.iter().map(|env| env.snapshot()).collect(),
             observations: self.observations.clone(),
+            n_steps: self.n_steps.clone(),
             n_episodes: self.n_episodes,
         }
     }
@@ -87,7 +103,8 @@ impl Lanes {
         &self.observations
     }
 
-    /// One control step in each environment; actions are `[n_envs × A]`.
+    /// One control step in each environment; actions are `[n_envs × A]`. An episode that is
+    /// as long as the settings want it ends as at a time limit.
     ///
     /// # Errors
     /// Whatever an environment refuses.
@@ -95,8 +112,15 @@ impl Lanes {
         let actions = actions.chunks(self.action_size);
         self.envs
             .iter_mut()
+            .zip(&mut self.n_steps)
             .zip(actions)
-            .map(|(env, action)| env.step(action))
+            .map(|((env, n_steps), action)| {
+                let mut step = env.step(action)?;
+                *n_steps += 1;
+                let is_over = *n_steps >= self.episode_len;
+                step.end = step.end.or(is_over.then_some(EpisodeEnd::TimeLimit));
+                Ok(step)
+            })
             .collect()
     }
 
@@ -137,6 +161,7 @@ impl Lanes {
     fn begin_episode(&mut self, lane: usize, replay: &mut Replay) {
         let seed = Rng::new(self.seed, Stream::EpisodeSeed, self.n_episodes).next_u64();
         self.n_episodes += 1;
+        self.n_steps[lane] = 0;
         let env = &mut self.envs[lane];
         let observation = env.reset(seed);
         replay.begin_episode(lane, seed, &observation, &env.pose(), env.stage());

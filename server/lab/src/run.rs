@@ -383,7 +383,8 @@ impl Run {
     /// What SAC's batches are made of at an environment step.
     fn batches(&self, step: u64) -> BatchRule {
         let bonus = self.method.bonus.map_or(0.0, |bonus| bonus.weight(step));
-        let steps = |episodes| episodes * self.spec.episode_len as usize;
+        let episode_len = self.config.episode_len(&self.spec) as usize;
+        let steps = |episodes| episodes * episode_len;
         BatchRule {
             reward: self.method.reward,
             disagreement_weight: bonus as f32,

@@ -146,6 +146,31 @@ fn a_run_stopped_again_and_again_ends_with_the_same_bits() {
 }
 
 #[test]
+fn episodes_of_training_are_as_long_as_the_settings_want_them_and_trials_as_the_tasks_are() {
+    let config = short_of("stair", &["environment.episode_len=50"]);
+    let folder = Folder::new("shorter");
+    let mut run = Run::start(config.clone(), &folder.0).unwrap();
+    let (outcome, events) = drive(&mut run, &mut Scripted::new(Box::new(Oracle), 0));
+    let metrics = events.iter().filter_map(|event| match event {
+        Event::Metrics(metrics) => Some((metrics.step, metrics.episodes)),
+        _ => None,
+    });
+    let seen: Vec<_> = metrics.collect();
+    assert!(!seen.is_empty());
+    for (step, episodes) in seen {
+        assert_eq!(u64::from(episodes), 2 * (step / 2 / 50), "at step {step}");
+    }
+    let trial = events.iter().find_map(|event| match event {
+        Event::Demonstration(demonstration) => Some(demonstration.poses.len()),
+        _ => None,
+    });
+    assert_eq!(trial, Some(100));
+    let expected = finished(outcome).weights;
+    assert_eq!(interrupted(&config, "shorter-stopped").weights, expected);
+    assert_ne!(uninterrupted(&short(), "longer").weights, expected);
+}
+
+#[test]
 fn another_seed_is_another_run_and_the_same_seed_the_same() {
     let config = short();
     let first = uninterrupted(&config, "same-1");

@@ -133,10 +133,20 @@ impl RunConfig {
             let known = SAMPLERS.iter().map(|(name, _)| *name);
             return Err(unknown("sampler", &q.sampler, known));
         }
+        let spec = (find_task(&self.task)?.spec)();
+        let (episode, segment) = (self.episode_len(&spec), self.segment_len(&spec));
+        if self.environment.episode_len > 0 {
+            require(
+                segment <= episode,
+                "environment.episode_len",
+                &episode,
+                "at least a segment's length",
+            )?;
+        }
         require(
-            q.segment_len <= (find_task(&self.task)?.spec)().episode_len,
+            segment <= episode,
             "queries.segment_len",
-            &q.segment_len,
+            &segment,
             "at most an episode's length",
         )
     }

@@ -35,7 +35,7 @@ impl Run {
         if method.bonus.is_some() {
             replay.keep_disagreement();
         }
-        let lanes = Lanes::start(task, config.environment.n_envs, config.seed, &mut replay);
+        let lanes = Lanes::start(task, &config, &mut replay);
         let folder = RunFolder::create(folder)?;
         let mut run = Self {
             task,
@@ -130,7 +130,7 @@ impl Run {
         let method = method::build(&config)?;
         let mut learner = Learner::new(&config, &spec, &method, Device::open(&config.device)?);
         learner.load(&archive)?;
-        let lanes = Lanes::restore(task, config.seed, archive.json::<LanesState>("lanes")?)?;
+        let lanes = Lanes::restore(task, &config, archive.json::<LanesState>("lanes")?)?;
         let mark: ReplayMark = archive.json("replay")?;
         let mut replay = Replay::open(
             &folder.replay(),
