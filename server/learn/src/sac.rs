@@ -18,7 +18,6 @@ mod config;
 mod outer;
 mod policy;
 
-use config::FIRST_ENTROPY;
 pub use config::SacConfig;
 pub(crate) use outer::FirstSteps;
 use policy::Gaussian;
@@ -308,7 +307,8 @@ impl Sac {
 
     /// Entropy towards which α leads the policy, nats.
     fn wanted_entropy(&self) -> f64 {
-        let each = FIRST_ENTROPY + self.done * (self.config.final_entropy - FIRST_ENTROPY);
+        let (first, last) = (self.config.initial_entropy, self.config.final_entropy);
+        let each = first + self.done * (last - first);
         each * self.action_size as f64
     }
 

@@ -166,12 +166,18 @@ impl RunConfig {
             ("agent.final_rate", agent.final_rate),
         ])?;
         not_zero([("agent.target_every", agent.target_every)])?;
-        require(
-            agent.final_entropy.is_finite() && agent.final_entropy <= 0.0,
-            "agent.final_entropy",
-            &agent.final_entropy,
-            "at most 0",
-        )
+        for (key, entropy) in [
+            ("agent.initial_entropy", agent.initial_entropy),
+            ("agent.final_entropy", agent.final_entropy),
+        ] {
+            require(
+                entropy.is_finite() && entropy < std::f64::consts::LN_2,
+                key,
+                &entropy,
+                "below ln 2, that of even chance",
+            )?;
+        }
+        Ok(())
     }
 
     fn check_reward(&self) -> Result<(), ConfigError> {

@@ -5,8 +5,8 @@ use serde::{Deserialize, Serialize};
 use crate::net::NetShape;
 use crate::precision::Precision;
 
-/// Entropy that SAC wants of a policy, nats for each number of an action.
-pub(super) const FIRST_ENTROPY: f64 = -1.0;
+/// Entropy that the released code wants of a policy, nats for each number of an action.
+const RELEASED_ENTROPY: f64 = -1.0;
 
 /// Settings of the agent. Defaults: STAIR's released settings for MetaWorld (which are BPref's).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -43,8 +43,12 @@ pub struct SacConfig {
     /// Share of the learning rates that is left at the run's last step, (0, 1]: they fall in
     /// a straight line. 1, the released code's, keeps them.
     pub final_rate: f64,
+    /// Entropy that the policy shall have at the run's first step, nats for each number of an
+    /// action: at most ln 2, that of even chance. −1 is the released code's.
+    pub initial_entropy: f64,
     /// Entropy that the policy shall have at the run's last step, nats for each number of an
-    /// action; it is led there from −1 in a straight line. −1, the released code's, stays.
+    /// action; it is led there from [`Self::initial_entropy`] in a straight line. −1, the released
+    /// code's, stays.
     ///
     /// Lower ones make the mean action, which is evaluated, as good as the sampled one. On a
     /// task reward success holds better with −3, and on go-fetch-return's learned one; on
@@ -77,7 +81,8 @@ impl Default for SacConfig {
             target_every: 2,
             actor_ema: 0.0,
             final_rate: 1.0,
-            final_entropy: FIRST_ENTROPY,
+            initial_entropy: RELEASED_ENTROPY,
+            final_entropy: RELEASED_ENTROPY,
             backup_entropy: true,
             layer_norm: false,
             precision: Precision::F32,
