@@ -319,11 +319,12 @@ impl RunConfig {
         }
     }
 
-    /// Steps in an episode of training: the setting, where the task's own is not shorter.
+    /// Steps in an episode of training: the setting, or the task's own.
     pub fn episode_len(&self, spec: &domain::environment::EnvSpec) -> u32 {
-        match self.environment.episode_len {
-            0 => spec.episode_len,
-            n_steps => n_steps.min(spec.episode_len),
+        if self.environment.episode_len == 0 {
+            spec.episode_len
+        } else {
+            self.environment.episode_len
         }
     }
 
@@ -505,13 +506,14 @@ mod tests {
         for bad in [
             "environment.n_envs=0",
             "environment.episode_len=5",
+            "environment.episode_len=100000",
             "queries.same_stage_fraction=1.5",
             "queries.sampler=disagrement",
             "queries.near_policy_episodes=0",
             "agent.actor_ema=1.5",
             "agent.final_rate=0.0",
             "reward.final_rate=0.0",
-            "agent.final_entropy=0.7",
+            "agent.final_entropy=0.5",
             "agent.initial_entropy=0.7",
             "teacher.mistake=1.5",
             "teacher.discount=0.0",

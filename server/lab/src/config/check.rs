@@ -134,20 +134,18 @@ impl RunConfig {
             return Err(unknown("sampler", &q.sampler, known));
         }
         let spec = (find_task(&self.task)?.spec)();
-        let (episode, segment) = (self.episode_len(&spec), self.segment_len(&spec));
-        if self.environment.episode_len > 0 {
-            require(
-                segment <= episode,
-                "environment.episode_len",
-                &episode,
-                "at least a segment's length",
-            )?;
-        }
         require(
-            segment <= episode,
+            q.segment_len <= spec.episode_len,
             "queries.segment_len",
-            &segment,
+            &q.segment_len,
             "at most an episode's length",
+        )?;
+        let episode_len = self.environment.episode_len;
+        require(
+            episode_len == 0 || (self.segment_len(&spec)..=spec.episode_len).contains(&episode_len),
+            "environment.episode_len",
+            &episode_len,
+            "0 or from a segment's length to that of the task's episodes",
         )
     }
 
@@ -166,18 +164,18 @@ impl RunConfig {
             ("agent.final_rate", agent.final_rate),
         ])?;
         not_zero([("agent.target_every", agent.target_every)])?;
-        for (key, entropy) in [
-            ("agent.initial_entropy", agent.initial_entropy),
-            ("agent.final_entropy", agent.final_entropy),
-        ] {
-            require(
-                entropy.is_finite() && entropy < std::f64::consts::LN_2,
-                key,
-                &entropy,
-                "below ln 2, that of even chance",
-            )?;
-        }
-        Ok(())
+        require(
+            agent.initial_entropy.is_finite() && agent.initial_entropy < std::f64::consts::LN_2,
+            "agent.initial_entropy",
+            &agent.initial_entropy,
+            "below ln 2, that of even chance",
+        )?;
+        require(
+            agent.final_entropy.is_finite() && agent.final_entropy <= 0.0,
+            "agent.final_entropy",
+            &agent.final_entropy,
+            "at most 0",
+        )
     }
 
     fn check_reward(&self) -> Result<(), ConfigError> {

@@ -58,10 +58,10 @@ fn every_sampler_and_every_teacher_drives_a_run_to_its_end() {
 }
 
 /// Task return before the first answer and after the last: small networks, dense sessions, so
-/// that each run takes half a minute.
-fn return_before_and_after(method: &str, teacher: &str) -> (f64, f64) {
+/// that each run takes seconds.
+fn return_before_and_after(method: &str, teacher: &str, more: &[&str]) -> (f64, f64) {
     let settings = [
-        "training.total_steps=13000",
+        "training.total_steps=7000",
         "agent.hidden=[64, 64]",
         "agent.batch=96",
         "reward.hidden=[64, 64]",
@@ -70,19 +70,19 @@ fn return_before_and_after(method: &str, teacher: &str) -> (f64, f64) {
         "temporal.latent=32",
         "temporal.batch=96",
         "temporal.block_episodes=8",
-        "feedback.first_step=2000",
+        "feedback.first_step=1500",
         "feedback.every=500",
         "feedback.queries_per_session=10",
-        "feedback.budget=200",
+        "feedback.budget=100",
         "steering.every=500",
         "semi_supervised.margin=2",
         "semi_supervised.crop_spread=2",
         "denoising.warm_start_steps=1",
-        "evaluation.every=2000",
+        "evaluation.every=1500",
         "evaluation.episodes=20",
     ];
     let folder = Folder::new(&format!("learns-{method}-{teacher}"));
-    let config = resolve(method, &["quick"], &settings);
+    let config = resolve(method, &["quick"], &[&settings, more].concat());
     let judge = judge(teacher, config.seed, &config.teacher).unwrap();
     let mut run = Run::start(config, &folder.0).unwrap();
     let (outcome, events) = drive(&mut run, &mut Scripted::new(judge, 0));
@@ -93,40 +93,48 @@ fn return_before_and_after(method: &str, teacher: &str) -> (f64, f64) {
     (first.unwrap(), finished(outcome).return_mean)
 }
 
-/// What return has to gain: of seeds 1 to 3 each method's gains more, a coin's less.
-const GAIN: f64 = 80.0;
-
 /// One test for each method, so that they can run side by side and a failure names it.
 macro_rules! learns {
-    ($($test:ident: $method:literal;)*) => { $(
+    ($($test:ident: $method:literal, $more:expr;)*) => { $(
         #[test]
         fn $test() {
-            let (before, after) = return_before_and_after($method, "oracle");
-            assert!(after > before + GAIN, "{before} before any answer, {after} after all");
+            let (before, after) = return_before_and_after($method, "oracle", $more);
+            assert!(after > before + 100.0, "{before} before any answer, {after} after all");
         }
     )* };
 }
 
+/// The same bar, a little later. RIME keeps the critics of its exploration, which have to unlearn
+/// novelty first; the others gain too little too soon with some seeds.
+const LATER: &[&str] = &[
+    "training.total_steps=13000",
+    "feedback.first_step=2000",
+    "feedback.budget=200",
+    "evaluation.every=2000",
+];
+
 learns! {
-    uniform_learns_from_answers: "uniform";
-    pebble_learns_from_answers: "pebble";
-    rune_learns_from_answers: "rune";
-    mrn_learns_from_answers: "mrn";
-    rime_learns_from_answers: "rime";
-    qpa_learns_from_answers: "qpa";
-    surf_learns_from_answers: "surf";
-    surf_without_crops_learns_from_answers: "surf_whole";
-    stair_isr_learns_from_answers: "stair_isr";
-    stair_by_timestep_learns_from_answers: "timestep";
-    sac_learns_from_the_task_reward: "sac";
+    uniform_learns_from_answers: "uniform", LATER;
+    pebble_learns_from_answers: "pebble", &[];
+    rune_learns_from_answers: "rune", &[];
+    mrn_learns_from_answers: "mrn", &[];
+    rime_learns_from_answers: "rime", LATER;
+    qpa_learns_from_answers: "qpa", LATER;
+    surf_learns_from_answers: "surf", LATER;
+    surf_without_crops_learns_from_answers: "surf_whole", LATER;
+    stair_isr_learns_from_answers: "stair_isr", &[];
+    stair_by_timestep_learns_from_answers: "timestep", &[];
+    sac_learns_from_the_task_reward: "sac", &[];
 }
 
-/// The bar of the tests above is one that a coin does not reach.
+/// The bar of the tests above is one that a coin does not reach, sooner or later.
 #[test]
 fn a_coin_does_not_teach_pebble_the_task() {
-    let (before, after) = return_before_and_after("pebble", "coin");
-    assert!(
-        after < before + GAIN,
-        "{before} before any answer, {after} after all"
-    );
+    for more in [&[], LATER] {
+        let (before, after) = return_before_and_after("pebble", "coin", more);
+        assert!(
+            after < before + 100.0,
+            "{before} before any answer, {after} after all"
+        );
+    }
 }

@@ -44,21 +44,20 @@ pub struct SacConfig {
     /// a straight line. 1, the released code's, keeps them.
     pub final_rate: f64,
     /// Entropy that the policy shall have at the run's first step, nats for each number of an
-    /// action: at most ln 2, that of even chance. −1 is the released code's.
+    /// action: below ln 2, that of even chance. −1 is the released code's.
     pub initial_entropy: f64,
     /// Entropy that the policy shall have at the run's last step, nats for each number of an
     /// action; it is led there from [`Self::initial_entropy`] in a straight line. −1, the released
     /// code's, stays.
     ///
-    /// Lower ones make the mean action, which is evaluated, as good as the sampled one. On a
-    /// task reward success holds better with −3, and on go-fetch-return's learned one; on
+    /// On a task reward success holds better with −3, and on go-fetch-return's learned one; on
     /// window-open's, which still moves, no gain was seen.
     pub final_entropy: f64,
     /// Whether the critics' targets hold α's bonus for chance, as SAC's and the released code's do.
     ///
     /// Without it chance still spreads each action, but no state is worth more for the chance that
-    /// it allows: where actions do nothing, as beside a jammed window, that bonus costs nothing and
-    /// can outweigh what the task pays elsewhere.
+    /// it allows: where actions do nothing, as beside a jammed window, that bonus costs nothing
+    /// and could outweigh what the task pays elsewhere. No gain was seen on learned rewards.
     pub backup_entropy: bool,
     /// Whether the critics' hidden layers are normalised; the released code's are not. With it,
     /// higher learning rates hold.
