@@ -530,6 +530,7 @@ mod tests {
             "agent.precision=f16",
             "agent.discount=1.0",
             "agent.critic_ema=0.0",
+            "agent.final_critic_ema=-0.1",
             "agent.target_every=0",
             "agent.actor_learning_rate=nan",
             "reward.members=0",

@@ -270,11 +270,8 @@ impl Sac {
             .n_updates
             .is_multiple_of(self.config.target_every.max(1))
         {
-            kernel::lerp(
-                &mut self.target_values,
-                &self.critic.parameters.values,
-                self.config.critic_ema,
-            );
+            let tau = self.critic_ema();
+            kernel::lerp(&mut self.target_values, &self.critic.parameters.values, tau);
         }
         self.n_updates += 1;
         SacMetrics {
@@ -293,8 +290,8 @@ impl Sac {
         self.critic.parameters.reset_moments();
     }
 
-    /// Leads the learning rates to [`SacConfig::final_rate`] and the policy's entropy to
-    /// [`SacConfig::final_entropy`]; `done` is the part of the run that is behind, [0, 1]. It
+    /// Leads the learning rates to [`SacConfig::final_rate`], the policy's entropy to
+    /// [`SacConfig::final_entropy`] and τ to [`SacConfig::final_critic_ema`]; `done` is the part of the run that is behind, [0, 1]. It
     /// follows from the step, so no checkpoint holds it.
     pub fn anneal(&mut self, done: f64) {
         self.done = done.clamp(0.0, 1.0);
@@ -303,6 +300,15 @@ impl Sac {
     /// Share of the learning rates that is left.
     fn rate(&self) -> f64 {
         1.0 + self.done * (self.config.final_rate - 1.0)
+    }
+
+    /// τ by now.
+    fn critic_ema(&self) -> f64 {
+        let (first, last) = (self.config.critic_ema, self.config.final_critic_ema);
+        if last == 0.0 {
+            return first;
+        }
+        first * (last / first).powf(self.done)
     }
 
     /// Entropy towards which α leads the policy, nats.

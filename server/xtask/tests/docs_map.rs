@@ -40,6 +40,32 @@ fn paths_in_code(text: &str) -> Vec<&str> {
         .collect()
 }
 
+/// The name under which a heading is linked to: lower case, spaces as hyphens, no other signs.
+fn anchor(heading: &str) -> String {
+    heading
+        .trim_start_matches('#')
+        .trim()
+        .to_lowercase()
+        .chars()
+        .filter(|sign| sign.is_alphanumeric() || " -_".contains(*sign))
+        .map(|sign| if sign == ' ' { '-' } else { sign })
+        .collect()
+}
+
+/// Whether the file is there and, behind a `#`, one of its headings.
+fn leads_somewhere(folder: &Path, target: &str) -> bool {
+    let (file, heading) = target.split_once('#').unwrap_or((target, ""));
+    let path = folder.join(file);
+    if heading.is_empty() {
+        return path.exists();
+    }
+    std::fs::read_to_string(path).is_ok_and(|text| {
+        text.lines()
+            .filter(|line| line.starts_with('#'))
+            .any(|line| anchor(line) == heading)
+    })
+}
+
 fn missing(document: &str) -> Vec<String> {
     let root = root();
     let path = root.join(document);
@@ -48,7 +74,7 @@ fn missing(document: &str) -> Vec<String> {
     let linked = links(&text)
         .into_iter()
         .filter(|target| !target.starts_with(PICTURES))
-        .filter(|target| !folder.join(target).exists());
+        .filter(|target| !leads_somewhere(folder, target));
     let named = paths_in_code(&text)
         .into_iter()
         .filter(|target| !root.join(target).exists());
@@ -78,6 +104,17 @@ fn every_crate_is_in_the_readme_and_in_the_architecture() {
         assert!(readme.contains(&format!("`server/{name}`")), "{name}");
         assert!(architecture.contains(&format!("### [`{name}`]")), "{name}");
     }
+}
+
+#[test]
+fn a_link_into_a_document_leads_to_one_of_its_headings() {
+    let leads = |target| leads_somewhere(&root(), target);
+    assert!(leads("README.md") && leads("CHANGELOG.md#unreleased"));
+    assert!(!leads("CHANGELOG.md#released") && !leads("NOTHING.md#unreleased"));
+    assert_eq!(
+        anchor("## abstract-mdp, query-counts"),
+        "abstract-mdp-query-counts"
+    );
 }
 
 #[test]

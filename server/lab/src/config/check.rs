@@ -158,7 +158,10 @@ impl RunConfig {
         ])?;
         not_negative([("agent.alpha_learning_rate", agent.alpha_learning_rate)])?;
         discounts([("agent.discount", agent.discount)])?;
-        shares([("agent.actor_ema", agent.actor_ema)])?;
+        shares([
+            ("agent.actor_ema", agent.actor_ema),
+            ("agent.final_critic_ema", agent.final_critic_ema),
+        ])?;
         shares_above_0([
             ("agent.critic_ema", agent.critic_ema),
             ("agent.final_rate", agent.final_rate),

@@ -32,6 +32,13 @@ pub struct SacConfig {
     ///
     /// Differs from the paper: its table says 0.01, the released code uses 0.005.
     pub critic_ema: f64,
+    /// τ at the run's last step, to which it grows by equal factors; 0, as in the released code,
+    /// keeps [`Self::critic_ema`].
+    ///
+    /// A state that follows itself can lose value only with a time constant of 1 / (τ (1 − γ))
+    /// updates: slow targets let an agent hope and so explore, later they keep it where it is
+    /// stuck. Rates that fall ([`Self::final_rate`]) let τ grow.
+    pub final_critic_ema: f64,
     /// Updates between two movements of the target critics.
     pub target_every: u64,
     /// How far the averaged actor, whose mean action is evaluated and kept, moves towards the
@@ -77,6 +84,7 @@ impl Default for SacConfig {
             discount: 0.99,
             initial_temperature: 0.1,
             critic_ema: 0.005,
+            final_critic_ema: 0.0,
             target_every: 2,
             actor_ema: 0.0,
             final_rate: 1.0,

@@ -344,6 +344,36 @@ fn the_entropy_that_is_wanted_goes_in_a_straight_line() {
     }
 }
 
+#[test]
+fn targets_follow_faster_by_equal_factors() {
+    let moved = |final_critic_ema: f64, done: f64| {
+        let config = SacConfig {
+            critic_ema: 0.01,
+            final_critic_ema,
+            target_every: 1,
+            ..small(false)
+        };
+        let mut sac = Sac::new(&config, SIZES.0, SIZES.1, 3, Device::CPU);
+        let before = sac.target_values.copy();
+        sac.anneal(done);
+        sac.update(&batch(20, 0), &mut Rng::new(6, Stream::Test, 0));
+        let way = &sac.critic.parameters.values - &before;
+        let moved = &sac.target_values - &before;
+        (moved * &way).sum(tch::Kind::Double).double_value(&[])
+            / (&way * &way).sum(tch::Kind::Double).double_value(&[])
+    };
+    for (last, done, share) in [
+        (0.0, 1.0, 0.01),
+        (0.16, 0.0, 0.01),
+        (0.16, 0.5, 0.04),
+        (0.16, 1.0, 0.16),
+        (0.16, 2.0, 0.16),
+    ] {
+        let seen = moved(last, done);
+        assert!((seen / share - 1.0).abs() < 1e-2, "{last}, {done}: {seen}");
+    }
+}
+
 /// The next state's bonus for chance is α's, discounted, and nothing where nothing follows.
 #[test]
 fn targets_hold_the_bonus_for_chance_only_where_it_is_wanted() {
