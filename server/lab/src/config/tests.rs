@@ -1,0 +1,173 @@
+use super::*;
+use crate::method;
+
+fn layers(presets: &[&str], overrides: &[&str]) -> Layers {
+    Layers {
+        presets: presets.iter().map(ToString::to_string).collect(),
+        overrides: overrides.iter().map(ToString::to_string).collect(),
+        ..Layers::default()
+    }
+}
+
+#[test]
+fn every_preset_resolves_for_every_task_and_method() {
+    for task in sim::tasks::tasks() {
+        for method in method::METHODS {
+            for presets in [vec![], vec!["quick".to_owned()]] {
+                let layers = Layers {
+                    task: Some(task.name.into()),
+                    method: Some(method.name.into()),
+                    presets,
+                    ..Layers::default()
+                };
+                RunConfig::resolve(&layers).unwrap();
+            }
+        }
+    }
+}
+
+/// ALGORITHMS.md 5 and the paper's tables of hyper-parameters.
+#[test]
+fn a_method_has_constants_of_its_own_for_some_tasks() {
+    let resolved = |method: &str, task: &str| {
+        let layers = Layers {
+            task: Some(task.into()),
+            method: Some(method.into()),
+            ..Layers::default()
+        };
+        RunConfig::resolve(&layers).unwrap()
+    };
+    let qpa = |task| resolved("qpa", task).queries.near_policy_episodes;
+    assert_eq!(
+        ["window-open", "door-open", "door-unlock"].map(qpa),
+        [10, 60, 30]
+    );
+    let rime = |task| resolved("rime", task).denoising.decay_epochs;
+    assert_eq!(["window-open", "quadruped-run"].map(rime), [600, 60]);
+    let mrn = |task| resolved("mrn", task).steering.every;
+    let tasks = ["door-open", "walker-run", "quadruped-walk", "cheetah-run"];
+    assert_eq!(tasks.map(mrn), [10_000, 1_000, 3_000, 5_000]);
+    let surf = |task| resolved("surf", task).semi_supervised.passes;
+    assert_eq!(["window-open", "cheetah-run"].map(surf), [20, 1_000]);
+}
+
+#[test]
+fn a_later_layer_wins_and_the_saved_tree_reads_back() {
+    let config = RunConfig::resolve(&layers(&["quick"], &["training.total_steps=123456"])).unwrap();
+    assert_eq!(config.training.total_steps, 123_456);
+    assert_eq!(
+        RunConfig::parse("saved", &config.to_toml()).unwrap(),
+        config
+    );
+}
+
+#[test]
+fn a_wrong_key_is_named_with_its_line_and_the_nearest_right_one() {
+    let file = (
+        "my.toml".to_owned(),
+        "seed = 3\n\n[feedback]\nbugdet = 10\n".to_owned(),
+    );
+    let error = RunConfig::resolve(&Layers {
+        file: Some(file),
+        ..Layers::default()
+    })
+    .unwrap_err();
+    let text = error.to_string();
+    assert!(
+        text.contains("my.toml: line 4") && text.contains("did you mean `budget`"),
+        "{text}"
+    );
+}
+
+#[test]
+fn a_wrong_name_is_answered_with_the_nearest_right_one() {
+    let wrong = Layers {
+        task: Some("windowopen".into()),
+        ..Layers::default()
+    };
+    assert!(
+        RunConfig::resolve(&wrong)
+            .unwrap_err()
+            .to_string()
+            .contains("did you mean 'window-open'")
+    );
+    let error = RunConfig::resolve(&layers(&["quik"], &[])).unwrap_err();
+    assert!(
+        error.to_string().contains("did you mean 'quick'"),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_value_of_the_wrong_kind_is_told_what_to_write_instead() {
+    for (bad, wanted) in [
+        ("agent.discount=high", "expected a number"),
+        (
+            "agent.batch=1.5",
+            "number `1.5`, expected a whole number, 0 or more",
+        ),
+        ("agent.batch=-1", "expected a whole number, 0 or more"),
+        ("agent.layer_norm=1", "expected true or false"),
+        ("agent.hidden=3", "expected a list, as in [256, 256]"),
+        ("queries.sampler=3", "expected text in quotes"),
+        ("agent=3", "expected a table of settings"),
+    ] {
+        let told = RunConfig::resolve(&layers(&[], &[bad])).unwrap_err();
+        let told = told.to_string();
+        assert!(told.starts_with(&format!("--set {bad}: ")), "{told}");
+        assert!(told.ends_with(wanted), "{told}");
+    }
+}
+
+#[test]
+fn a_value_out_of_range_or_of_the_wrong_kind_is_refused() {
+    for bad in [
+        "environment.n_envs=0",
+        "environment.episode_len=5",
+        "environment.episode_len=100000",
+        "queries.same_stage_fraction=1.5",
+        "queries.sampler=disagrement",
+        "queries.near_policy_episodes=0",
+        "agent.actor_ema=1.5",
+        "agent.final_rate=0.0",
+        "reward.final_rate=0.0",
+        "agent.final_entropy=0.5",
+        "agent.initial_entropy=0.7",
+        "teacher.mistake=1.5",
+        "teacher.discount=0.0",
+        "bonus.decay=1.0",
+        "denoising.flip_below=0.0",
+        "semi_supervised.certainty=0.2",
+        "semi_supervised.passes=0",
+        "seed=many",
+        "seed",
+        "feedback.every=0",
+        "agent.hidden=[256, 0]",
+        "agent.hidden=[1000000000]",
+        "agent.batch=0",
+        "agent.precision=f16",
+        "agent.discount=1.0",
+        "agent.critic_ema=0.0",
+        "agent.final_critic_ema=-0.1",
+        "agent.target_every=0",
+        "agent.actor_learning_rate=nan",
+        "reward.members=0",
+        "reward.learning_rate=-1e-3",
+        "reward.label_margin=0.5",
+        "reward.max_epochs=0",
+        "temporal.block_episodes=0",
+        "temporal.update_every=0",
+        "temporal.discount=1.0",
+        "temporal.latent=7",
+        "temporal.max_gradient_norm=0.0",
+        "steering.every=0",
+        "exploration.neighbours=0",
+        "queries.coefficients.stage=nan",
+    ] {
+        let error = RunConfig::resolve(&layers(&[], &[bad])).unwrap_err();
+        let (key, value) = bad.split_once('=').unwrap_or((bad, bad));
+        // A name out of a list is told by itself, among its neighbours.
+        let word = if key == "queries.sampler" { value } else { key };
+        assert!(error.to_string().contains(word), "{bad}: {error}");
+    }
+}
