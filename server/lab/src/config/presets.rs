@@ -92,7 +92,7 @@ mod tests {
         let own = preset("quick", door).unwrap();
         let mut like = preset("quick", window).unwrap();
         assert_ne!(own, like);
-        like["feedback"]["queries_per_session"] = Value::Integer(120);
+        like["feedback"]["queries_per_session"] = Value::Integer(60);
         like["feedback"]["budget"] = Value::Integer(3000);
         assert_eq!(own, like);
     }
