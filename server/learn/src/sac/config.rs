@@ -37,7 +37,8 @@ pub struct SacConfig {
     ///
     /// A state that follows itself can lose value only with a time constant of 1 / (τ (1 − γ))
     /// updates: slow targets let an agent hope and so explore, later they keep it where it is
-    /// stuck. Rates that fall ([`Self::final_rate`]) let τ grow.
+    /// stuck. Rates that fall ([`Self::final_rate`]) let τ grow. No gain was seen on window-open's
+    /// learned rewards.
     pub final_critic_ema: f64,
     /// Updates between two movements of the target critics.
     pub target_every: u64,
