@@ -13,6 +13,7 @@ mod figure;
 mod golden;
 mod interrupt;
 mod openapi;
+mod provenance;
 mod render;
 mod serve;
 mod study;

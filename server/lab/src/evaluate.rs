@@ -2,6 +2,7 @@
 
 use domain::environment::{EnvError, Environment};
 use domain::random::{Rng, Stream};
+use learn::device::with_denormals;
 
 use crate::stepping::step_all;
 
@@ -92,7 +93,8 @@ pub fn evaluate(
     let mut envs: Vec<Box<dyn Environment>> = (0..n).map(|_| (task.make)()).collect();
     let mut observations: Vec<f32> = Vec::with_capacity(n * spec.observation_size);
     for (index, env) in envs.iter_mut().enumerate() {
-        observations.extend(env.reset(held_out_seed(seed, index as u32)));
+        let seed = held_out_seed(seed, index as u32);
+        observations.extend(with_denormals(|| env.reset(seed)));
     }
     let mut trial = Trial {
         returns: vec![0.0; n],

@@ -201,7 +201,8 @@ impl RunFolder {
     }
 }
 
-fn write_durably(path: &Path, bytes: &[u8]) -> Result<(), RunError> {
+/// Writes a file so that a kill leaves the old or the new one.
+pub(crate) fn write_durably(path: &Path, bytes: &[u8]) -> Result<(), RunError> {
     let draft = path.with_extension("draft");
     let written = File::create(&draft).and_then(|mut file| {
         file.write_all(bytes)?;

@@ -2,6 +2,7 @@
 
 use domain::environment::{EnvError, Environment, EpisodeEnd, Step};
 use domain::random::{Rng, Stream};
+use learn::device::with_denormals;
 use learn::replay::{NewStep, Replay};
 use learn::reward::Estimate;
 use serde::{Deserialize, Serialize};
@@ -56,8 +57,10 @@ impl Lanes {
         let n = state.snapshots.len();
         let mut lanes = Self::unstarted(task, n, config);
         for (env, snapshot) in lanes.envs.iter_mut().zip(&state.snapshots) {
-            env.reset(0);
-            env.restore(snapshot)?;
+            with_denormals(|| {
+                env.reset(0);
+                env.restore(snapshot)
+            })?;
         }
         if state.n_steps.len() == n {
             lanes.n_steps = state.n_steps;
@@ -115,7 +118,7 @@ impl Lanes {
             .zip(&mut self.n_steps)
             .zip(actions)
             .map(|((env, n_steps), action)| {
-                let mut step = env.step(action)?;
+                let mut step = with_denormals(|| env.step(action))?;
                 *n_steps += 1;
                 let is_over = *n_steps >= self.episode_len;
                 step.end = step.end.or(is_over.then_some(EpisodeEnd::TimeLimit));
@@ -163,7 +166,7 @@ impl Lanes {
         self.n_episodes += 1;
         self.n_steps[lane] = 0;
         let env = &mut self.envs[lane];
-        let observation = env.reset(seed);
+        let observation = with_denormals(|| env.reset(seed));
         replay.begin_episode(lane, seed, &observation, &env.pose(), env.stage());
         self.observations[lane * self.observation_size..][..self.observation_size]
             .copy_from_slice(&observation);

@@ -8,6 +8,7 @@ pub mod cost;
 pub mod evaluate;
 pub mod experiment;
 pub mod figure;
+pub mod history;
 pub mod memory;
 pub mod message;
 pub mod method;

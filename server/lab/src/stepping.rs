@@ -1,6 +1,7 @@
 //! One control step of many environments, on several threads.
 
 use domain::environment::{EnvError, Environment, Step};
+use learn::device::with_denormals;
 use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 
 /// An environment and what to do in it, `[A]`.
@@ -15,7 +16,7 @@ pub type Turn<'a> = (&'a mut dyn Environment, &'a [f32]);
 pub fn step_all(turns: Vec<Turn<'_>>) -> Result<Vec<Step>, EnvError> {
     let steps: Vec<Result<Step, EnvError>> = turns
         .into_par_iter()
-        .map(|(env, action)| env.step(action))
+        .map(|(env, action)| with_denormals(|| env.step(action)))
         .collect();
     steps.into_iter().collect()
 }

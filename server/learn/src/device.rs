@@ -7,6 +7,8 @@ use libloading::os::unix::{Library, RTLD_GLOBAL, RTLD_NOW};
 
 use crate::error::LearnError;
 
+mod denormals;
+
 /// The libtorch that tch is bound to.
 const LIBTORCH_VERSION: &str = "2.11.0";
 
@@ -77,14 +79,26 @@ fn load_cuda() -> Result<(), String> {
 /// (two threads inside one product gain 1.2×, and waiting ones spin). MKL keeps its number of
 /// threads for each thread apart, so a new thread would start with one for each core. Freed
 /// memory of up to 32 MiB a block is kept, because giving it back and faulting it in again
-/// costs more than the arithmetic on it.
+/// costs more than the arithmetic on it. Numbers below 1.2e-38 become zero: what they add is lost
+/// in any sum, and Intel's processors take a hundred times as long for them, which is where the
+/// moments of units that no longer learn and the probabilities of far pairs end up.
 pub fn init() {
     static ONCE: Once = Once::new();
     ONCE.call_once(keep_freed_memory);
     thread_local! {
-        static IS_ALONE: () = tch::set_num_threads(1);
+        static IS_READY: () = {
+            tch::set_num_threads(1);
+            denormals::flush();
+        };
     }
-    IS_ALONE.with(|()| ());
+    IS_READY.with(|()| ());
+}
+
+/// Does something that is no learning, such as physics, with all of single precision, on a thread
+/// that may or may not have been prepared ([`init`]): the result is the same on either.
+pub fn with_denormals<R>(work: impl FnOnce() -> R) -> R {
+    let _until_done = denormals::Kept::begin();
+    work()
 }
 
 #[cfg(all(target_os = "linux", target_env = "gnu"))]

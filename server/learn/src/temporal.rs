@@ -267,7 +267,8 @@ impl TemporalDistance {
             trace(&columns),
             hits.to_kind(Kind::Double).mean(None),
         ];
-        let slope = (rows.exp() * forward + columns.exp() * backward) / n as f64;
+        let probability = |log: &Tensor| log.clamp_min(LEAST_LOG).exp();
+        let slope = (probability(&rows) * forward + probability(&columns) * backward) / n as f64;
         let _ = slope.diagonal(0, 0, 1).g_sub_scalar_(1.0 / n as f64);
 
         self.parameters.zero_gradient();
@@ -415,6 +416,9 @@ fn steps_ahead(left: u32, discount: f64, u: f64) -> u32 {
     (k.max(1.0) as u32).min(left)
 }
 
+/// Logarithm of the least probability that a pair is given, still a normal number: below it the
+/// exponential takes a slow path for each.
+const LEAST_LOG: f64 = -87.0;
 /// States encoded at once.
 const CHUNK_STATES: usize = 2_048;
 /// Key of the initial weights.

@@ -118,7 +118,7 @@ fn write_with_picture(path: &Path, text: String) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn processors() -> NonZeroUsize {
+pub(super) fn processors() -> NonZeroUsize {
     std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN)
 }
 

@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use anyhow::Context;
 use domain::scene::{Camera, Frame, Scene};
 use lab::config::find_task;
+use learn::device::with_denormals;
 use render::{CLIP_SIZE, Renderer, RgbaImage, SHEET_FRAMES, clip, contact_sheet, evenly};
 
 use super::BadInput;
@@ -123,10 +124,11 @@ fn episode(
 ) -> anyhow::Result<Vec<Frame>> {
     let n_steps = n_steps.unwrap_or((task.spec)().episode_len).max(1);
     let mut environment = (task.make)();
-    let mut observation = environment.reset(seed);
+    let mut observation = with_denormals(|| environment.reset(seed));
     let mut frames = Vec::new();
     for t in 0..n_steps {
-        let step = environment.step(&policy.act(&observation, t))?;
+        let action = policy.act(&observation, t);
+        let step = with_denormals(|| environment.step(&action))?;
         frames.push((task.place)(&environment.pose()));
         observation = step.observation;
         if step.end.is_some() {

@@ -9,12 +9,13 @@ use anyhow::Context as _;
 use domain::teacher::{Judge, Scripted, TeacherSettings};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use lab::config::{Layers, RunConfig};
+use lab::history::Sitting;
 use lab::message::{Command, Event};
 use lab::run::{Outcome, Run};
 use serde_json::json;
 
-use super::BadInput;
 use super::interrupt::on_interrupt;
+use super::{BadInput, provenance};
 
 /// Train an agent with a scripted teacher.
 #[derive(Debug, clap::Args)]
@@ -77,14 +78,24 @@ pub struct Args {
     reason = "every command has this signature"
 )]
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let started = Instant::now();
     let (mut run, folder) = open(&args)?;
+    let sitting = Sitting::begin(&folder, &provenance::here(&run.config().device), started)?;
     let judge = judge(&args.teacher, run.config().seed, &run.config().teacher)?;
     let mut teacher = Scripted::new(judge, run.consumed_sequence());
     let (sender, commands) = channel();
     stop_when_told(sender, args.until_eof)?;
-    let started = Instant::now();
     let mut progress = Progress::new(&run, args.json);
-    let outcome = run.drive(&mut teacher, &commands, &mut |event| progress.show(&event))?;
+    let mut kept = Ok(());
+    let outcome = run.drive(&mut teacher, &commands, &mut |event| {
+        if matches!(event, Event::Checkpointed(_)) {
+            kept = sitting.keep();
+        }
+        progress.show(&event);
+    })?;
+    kept?;
+    sitting.keep()?;
+    let wall_s = sitting.history().wall_s;
     progress.bar.finish_and_clear();
     let config = run.config();
     match outcome {
@@ -99,7 +110,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
                 "task": config.task, "method": config.method, "seed": config.seed,
                 "env_steps": finished.step, "labels": finished.labels,
                 "success_rate": finished.success_rate, "return_mean": finished.return_mean,
-                "wall_s": started.elapsed().as_secs_f64(), "checkpoint": folder,
+                "wall_s": wall_s, "checkpoint": folder,
                 "weights": finished.weights,
             })
         ),
@@ -112,7 +123,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             finished.return_mean,
             finished.step,
             finished.labels,
-            started.elapsed().as_secs_f64(),
+            wall_s,
             finished.weights,
             config.task,
             folder.display()

@@ -7,12 +7,13 @@ use serde::{Deserialize, Serialize};
 
 use super::grid::RunKey;
 use crate::config::{ConfigError, RunConfig, find_task};
+use crate::history::RunHistory;
 use crate::message::{Evaluation, Event, SessionOffered};
 use crate::method;
 
 mod folder;
 
-pub use folder::{GridFolder, Misfit, RunHistory, StoreError};
+pub use folder::{GridFolder, Misfit, StoreError};
 
 /// One line of `results.jsonl`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -69,15 +70,6 @@ pub struct RunRow {
     pub machine: String,
     /// Wall time, seconds, with whatever else ran on the machine.
     pub wall_s: f64,
-}
-
-/// Where rows come from.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Provenance {
-    /// Of the program.
-    pub revision: String,
-    /// Processor and cores of the machine.
-    pub machine: String,
 }
 
 /// The rows of a finished run from its settings and its metrics; `None` while it is not over.

@@ -20,11 +20,13 @@ use std::time::{Duration, Instant};
 use anyhow::Context as _;
 use indicatif::{ProgressBar, ProgressStyle};
 use lab::experiment::grid::GridRun;
-use lab::experiment::results::{GridFolder, Provenance, Results, RunHistory, rows_of_run};
+use lab::experiment::results::{GridFolder, Results, rows_of_run};
+use lab::history::RunHistory;
 use lab::run::Run;
 use serde_json::json;
 
 use super::{check, in_words};
+use crate::cli::provenance::REVISION;
 
 /// Between looks at the processes.
 const LOOK: Duration = Duration::from_millis(100);
@@ -48,7 +50,6 @@ pub(super) struct Tally {
 pub(super) struct Pool<'a> {
     folder: &'a GridFolder,
     log: File,
-    provenance: Provenance,
     jobs: usize,
 }
 
@@ -56,8 +57,6 @@ pub(super) struct Pool<'a> {
 struct Worker<'a> {
     run: &'a GridRun,
     child: Child,
-    began: Instant,
-    history: RunHistory,
 }
 
 /// How the process of a run ended.
@@ -69,18 +68,8 @@ enum End {
 
 impl<'a> Pool<'a> {
     /// * `log` – locked; runs write to it and hold the lock with it
-    pub(super) fn new(
-        folder: &'a GridFolder,
-        log: File,
-        provenance: Provenance,
-        jobs: usize,
-    ) -> Self {
-        Self {
-            folder,
-            log,
-            provenance,
-            jobs,
-        }
+    pub(super) fn new(folder: &'a GridFolder, log: File, jobs: usize) -> Self {
+        Self { folder, log, jobs }
     }
 
     /// Runs whatever is not finished, until all is or somebody says stop.
@@ -134,9 +123,7 @@ impl<'a> Pool<'a> {
     fn start(&self, run: &'a GridRun) -> anyhow::Result<Worker<'a>> {
         let path = self.folder.run_path(&run.key);
         let settings = self.folder.keep_settings(&run.config)?;
-        let mut history = self.folder.history(&run.key);
-        history.goes_on(&self.provenance);
-        self.folder.keep_history(&run.key, &history)?;
+        std::fs::create_dir_all(&path).context("cannot make the run's folder")?;
         let program = std::env::current_exe().context("cannot find this program")?;
         let mut command = Command::new(program);
         command.args([
@@ -166,28 +153,24 @@ impl<'a> Pool<'a> {
         Ok(Worker {
             run,
             child: child.context("cannot start a run")?,
-            began: Instant::now(),
-            history,
         })
     }
 
     /// Keeps what a run came to.
     fn close(
         &self,
-        mut worker: Worker,
+        worker: Worker,
         status: ExitStatus,
         tally: &mut Tally,
         progress: &Progress,
     ) -> anyhow::Result<()> {
         let (run, key) = (worker.run, &worker.run.key);
-        worker.history.wall_s += worker.began.elapsed().as_secs_f64();
-        self.folder.keep_history(key, &worker.history)?;
         let path = self.folder.run_path(key);
         match end(&path, status) {
             End::Finished => {
                 let metrics = std::fs::read_to_string(path.join("metrics.jsonl"))
                     .with_context(|| format!("cannot read the metrics of {}", key.name()))?;
-                match rows_of_run(key, &run.config, &metrics, &worker.history)? {
+                match rows_of_run(key, &run.config, &metrics, &RunHistory::of(&path))? {
                     Some(rows) => {
                         self.folder.add(&rows)?;
                         self.folder.slim(key)?;
@@ -211,8 +194,7 @@ impl<'a> Pool<'a> {
     }
 
     fn fail(&self, run: &GridRun, reason: String, tally: &mut Tally) -> anyhow::Result<()> {
-        let revision = &self.provenance.revision;
-        self.folder.add_failure(&run.key, &reason, revision)?;
+        self.folder.add_failure(&run.key, &reason, REVISION)?;
         tally.failed.push((run.key.name(), reason));
         Ok(())
     }

@@ -8,13 +8,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
-use lab::experiment::results::{GridFolder, Provenance};
+use lab::experiment::results::GridFolder;
 use learn::device::Device;
 
 use super::pool::{Pool, Tally};
 use super::{Chosen, processors};
 use crate::cli::BadInput;
 use crate::cli::interrupt::on_interrupt;
+use crate::cli::provenance::REVISION;
 
 /// How long to wait for runs of an earlier start to leave their checkpoints.
 const PATIENCE: Duration = Duration::from_mins(1);
@@ -55,15 +56,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
             run.config.device.clone_from(device);
         }
     }
-    let uses_card = chosen.grid.runs.iter().any(|r| r.config.device != "cpu");
     let named = || PathBuf::from("data/experiments").join(&chosen.stem);
     let out = args.out.clone().unwrap_or_else(named);
     let folder = GridFolder::at(&out);
-    let provenance = Provenance {
-        revision: env!("STAIR_REVISION").into(),
-        machine: machine(uses_card),
-    };
-    let revision = (!args.mixed).then_some(provenance.revision.as_str());
+    let revision = (!args.mixed).then_some(REVISION);
     let results = folder.results().map_err(BadInput::from_error)?;
     folder
         .check(&chosen.grid.runs, &results, revision)
@@ -77,7 +73,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     on_interrupt(move || hears.store(true, Ordering::SeqCst))?;
     let jobs = args.jobs.unwrap_or_else(processors).get();
     let results = folder.results().map_err(BadInput::from_error)?; // another start may have added some
-    let pool = Pool::new(&folder, log, provenance, jobs);
+    let pool = Pool::new(&folder, log, jobs);
     let tally = pool.work(&chosen.grid.runs, &results, &is_told)?;
     Ok(tell(&tally, &out))
 }
@@ -117,35 +113,4 @@ fn tell(tally: &Tally, out: &std::path::Path) -> ExitCode {
         println!("Report: stair experiment report {}", out.display());
     }
     ExitCode::from(u8::from(!tally.failed.is_empty()))
-}
-
-/// `AMD EPYC 9R45, 2 cores`, with the graphics cards where runs use them.
-fn machine(uses_card: bool) -> String {
-    let cpus = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-    let model = cpus.lines().find(|line| line.starts_with("model name"));
-    let model = model
-        .and_then(|line| line.split_once(": "))
-        .map(|(_, name)| name.trim());
-    let cores = processors();
-    let mut machine = format!("{}, {cores} cores", model.unwrap_or("unknown processor"));
-    if uses_card {
-        for card in cards() {
-            machine.push_str(", ");
-            machine.push_str(&card);
-        }
-    }
-    machine
-}
-
-/// `NVIDIA H100 80GB HBM3`, as the driver tells; none where it does not.
-fn cards() -> Vec<String> {
-    let Ok(folders) = std::fs::read_dir("/proc/driver/nvidia/gpus") else {
-        return Vec::new();
-    };
-    let told = folders.flatten().filter_map(|card| {
-        let told = std::fs::read_to_string(card.path().join("information")).ok()?;
-        let model = told.lines().find_map(|line| line.strip_prefix("Model:"))?;
-        Some(model.trim().to_owned())
-    });
-    told.collect()
 }

@@ -4,7 +4,7 @@
 //! experiment.toml       the file as it was given
 //! results.jsonl         rows of the runs that are over
 //! settings/HASH.toml    resolved settings by fingerprint, seeds left out
-//! runs/NAME/            a run: its folder, history.json, log.txt
+//! runs/NAME/            a run: its folder, with history.json, and log.txt
 //! progress.json         where the grid is, while it runs
 //! log.jsonl             what runs said at their end; locked while any of them is up
 //! ```
@@ -13,35 +13,9 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
-use serde::{Deserialize, Serialize};
-
-use super::{Content, Provenance, Results, Row, fingerprint, without_seed};
+use super::{Content, Results, Row, fingerprint, without_seed};
 use crate::config::{ConfigError, RunConfig};
 use crate::experiment::grid::{GridRun, RunKey};
-
-/// What ran when: kept beside a run's folder, across stops and kills.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct RunHistory {
-    /// Of the program, in order, each once.
-    pub revisions: Vec<String>,
-    /// Machines, in order, each once.
-    pub machines: Vec<String>,
-    /// Wall time so far, seconds.
-    pub wall_s: f64,
-}
-
-impl RunHistory {
-    /// Notes who goes on with the run now.
-    pub fn goes_on(&mut self, provenance: &Provenance) {
-        let add = |list: &mut Vec<String>, item: &str| {
-            if list.last().is_none_or(|last| last != item) {
-                list.push(item.to_owned());
-            }
-        };
-        add(&mut self.revisions, &provenance.revision);
-        add(&mut self.machines, &provenance.machine);
-    }
-}
 
 /// Why a grid's folder cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -209,28 +183,6 @@ impl GridFolder {
         let name = format!("settings/{}.toml", fingerprint(config));
         self.replace(&name, &without_seed(config).to_toml())?;
         Ok(self.root.join(name))
-    }
-
-    /// What is known of a run that was started; nothing of one that was not.
-    pub fn history(&self, key: &RunKey) -> RunHistory {
-        let text = fs::read_to_string(self.run_path(key).join("history.json"));
-        text.ok()
-            .and_then(|text| serde_json::from_str(&text).ok())
-            .unwrap_or_default()
-    }
-
-    /// Keeps it.
-    ///
-    /// # Errors
-    /// When the disk refuses.
-    ///
-    /// # Panics
-    /// Never: a history is plain values.
-    pub fn keep_history(&self, key: &RunKey, history: &RunHistory) -> Result<(), StoreError> {
-        let path = self.run_path(key);
-        fs::create_dir_all(&path).map_err(refused("make the run's folder", &path))?;
-        let text = serde_json::to_string(history).expect("a history is plain values");
-        self.replace(&format!("runs/{}/history.json", key.name()), &text)
     }
 
     /// Refuses results that the runs of a grid do not fit: other settings under the same name,

@@ -1,5 +1,6 @@
 use super::*;
 use crate::experiment::grid::GridRun;
+use crate::history::Provenance;
 
 const METRICS: &str = "{\"kind\":\"evaluation\",\"step\":500,\"labels\":4,\"episodes\":10,\"success_rate\":0.5,\
 \"return_mean\":7.5,\"return_std\":1.0,\"reward_correlation\":null}\n\

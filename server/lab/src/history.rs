@@ -1,0 +1,136 @@
+//! Who worked on a run, and for how long: `history.json` in its folder, across stops and kills.
+
+use std::fs;
+use std::path::Path;
+use std::time::Instant;
+
+use serde::{Deserialize, Serialize};
+
+use crate::folder::write_durably;
+use crate::run::RunError;
+
+const FILE: &str = "history.json";
+
+/// Where a run is computed.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Provenance {
+    /// Of the program.
+    pub revision: String,
+    /// Processor and cores of the machine.
+    pub machine: String,
+}
+
+/// What ran when.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct RunHistory {
+    /// Of the program, in order, each once.
+    pub revisions: Vec<String>,
+    /// Machines, in order, each once.
+    pub machines: Vec<String>,
+    /// Wall time so far, seconds; of a part that was killed, up to its last checkpoint.
+    pub wall_s: f64,
+}
+
+impl RunHistory {
+    /// What the run's folder knows; nothing of a run that was never started.
+    pub fn of(folder: &Path) -> Self {
+        let text = fs::read_to_string(folder.join(FILE));
+        text.ok()
+            .and_then(|text| serde_json::from_str(&text).ok())
+            .unwrap_or_default()
+    }
+
+    /// Notes who goes on with the run now.
+    pub fn goes_on(&mut self, provenance: &Provenance) {
+        let add = |list: &mut Vec<String>, item: &str| {
+            if list.last().is_none_or(|last| last != item) {
+                list.push(item.to_owned());
+            }
+        };
+        add(&mut self.revisions, &provenance.revision);
+        add(&mut self.machines, &provenance.machine);
+    }
+}
+
+/// The history of a run that goes on in this process.
+#[derive(Debug)]
+pub struct Sitting<'a> {
+    folder: &'a Path,
+    before: RunHistory,
+    began: Instant,
+}
+
+impl<'a> Sitting<'a> {
+    /// Goes on with a run, and keeps who does.
+    ///
+    /// * `began` – when its process did
+    ///
+    /// # Errors
+    /// When the disk refuses.
+    pub fn begin(
+        folder: &'a Path,
+        provenance: &Provenance,
+        began: Instant,
+    ) -> Result<Self, RunError> {
+        let mut before = RunHistory::of(folder);
+        before.goes_on(provenance);
+        let sitting = Self {
+            folder,
+            before,
+            began,
+        };
+        sitting.keep()?;
+        Ok(sitting)
+    }
+
+    /// The whole so far.
+    pub fn history(&self) -> RunHistory {
+        RunHistory {
+            wall_s: self.before.wall_s + self.began.elapsed().as_secs_f64(),
+            ..self.before.clone()
+        }
+    }
+
+    /// Keeps the whole so far.
+    ///
+    /// # Errors
+    /// When the disk refuses.
+    pub fn keep(&self) -> Result<(), RunError> {
+        let text = serde_json::to_vec(&self.history()).expect("a history is plain values");
+        write_durably(&self.folder.join(FILE), &text)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+
+    #[test]
+    fn a_run_that_was_stopped_tells_of_its_whole() {
+        let folder = tempfile::tempdir().unwrap();
+        let of = |revision: &str| Provenance {
+            revision: revision.into(),
+            machine: "two cores".into(),
+        };
+        let earlier = Instant::now().checked_sub(Duration::from_secs(100));
+        let earlier = earlier.unwrap();
+        for (revision, least) in [("a", 100.0), ("a", 200.0), ("b", 300.0)] {
+            let sitting = Sitting::begin(folder.path(), &of(revision), earlier).unwrap();
+            sitting.keep().unwrap();
+            let kept = RunHistory::of(folder.path());
+            assert!(kept.wall_s >= least, "{kept:?}");
+            assert!(kept.wall_s <= sitting.history().wall_s);
+        }
+        let kept = RunHistory::of(folder.path());
+        assert_eq!(kept.revisions, ["a", "b"]);
+        assert_eq!(kept.machines, ["two cores"]);
+    }
+
+    #[test]
+    fn a_run_that_was_never_started_has_none() {
+        let folder = tempfile::tempdir().unwrap();
+        assert_eq!(RunHistory::of(folder.path()), RunHistory::default());
+    }
+}
