@@ -66,6 +66,11 @@ fn a_run_that_cannot_be_started_says_what_is_wrong() {
         "bach",
     );
     refuse(json!({"task": "window-open", "colour": "red"}), "colour");
+    refuse(
+        json!({"task": "window-open", "seed": "seven"}),
+        "expected a whole number, 0 or more (line 1",
+    );
+    refuse(json!({"task": 3}), "expected text in quotes");
     all.send("GET", "/api/v1/runs/99", None).expect(404);
     all.send("GET", "/api/v1/runs/none", None).expect(404);
     all.send("DELETE", "/api/v1/runs", None).expect(405);

@@ -4,7 +4,7 @@ use axum::Json;
 use axum::extract::rejection::{JsonRejection, PathRejection, QueryRejection};
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
-use lab::config::ConfigError;
+use lab::config::{ConfigError, plainly};
 use serde::Serialize;
 use serde_json::{Value, json};
 use store::{StoreError, rfc3339};
@@ -351,7 +351,23 @@ impl From<ConfigError> for Problem {
 
 impl From<JsonRejection> for Problem {
     fn from(rejection: JsonRejection) -> Self {
-        Self::bad_request(rejection.status(), rejection.body_text())
+        let told = rejection.body_text();
+        let detail = match rejection {
+            JsonRejection::JsonDataError(_) => misfit(&told),
+            _ => told,
+        };
+        Self::bad_request(rejection.status(), detail)
+    }
+}
+
+/// A body that is JSON but not what was asked for: where, what stands there, and what to write.
+fn misfit(told: &str) -> String {
+    let told = told
+        .strip_prefix("Failed to deserialize the JSON body into the target type: ")
+        .unwrap_or(told);
+    match told.rsplit_once(" at line ") {
+        Some((message, place)) => format!("{} (line {place})", plainly(message)),
+        None => plainly(told),
     }
 }
 

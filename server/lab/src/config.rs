@@ -19,9 +19,9 @@ mod command;
 mod layers;
 mod presets;
 
-pub use layers::Layers;
 pub(crate) use layers::invalid;
 use layers::parse_layer;
+pub use layers::{Layers, plainly};
 pub use presets::PRESETS;
 pub(crate) use presets::preset_names;
 

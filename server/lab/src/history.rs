@@ -67,6 +67,9 @@ impl<'a> Sitting<'a> {
     ///
     /// # Errors
     /// When the disk refuses.
+    ///
+    /// # Panics
+    /// Never.
     pub fn begin(
         folder: &'a Path,
         provenance: &Provenance,
@@ -95,6 +98,9 @@ impl<'a> Sitting<'a> {
     ///
     /// # Errors
     /// When the disk refuses.
+    ///
+    /// # Panics
+    /// Never: a history is plain values.
     pub fn keep(&self) -> Result<(), RunError> {
         let text = serde_json::to_vec(&self.history()).expect("a history is plain values");
         write_durably(&self.folder.join(FILE), &text)

@@ -122,7 +122,7 @@ pub(crate) fn invalid(origin: &str, text: &str, error: &toml::de::Error) -> Conf
 }
 
 /// A message of serde's with the names of Rust's types put as what a person would write.
-fn plainly(message: &str) -> String {
+pub fn plainly(message: &str) -> String {
     let Some((found, expected)) = message.rsplit_once("expected ") else {
         return message.into();
     };

@@ -108,7 +108,7 @@ impl<'a> Pool<'a> {
             for mut worker in std::mem::take(&mut up) {
                 match worker.child.try_wait().context("cannot watch a run")? {
                     None => up.push(worker),
-                    Some(status) => self.close(worker, status, &mut tally, &progress)?,
+                    Some(status) => self.close(&worker, status, &mut tally, &progress)?,
                 }
             }
             progress.show(&tally, &waiting, &up)?;
@@ -159,7 +159,7 @@ impl<'a> Pool<'a> {
     /// Keeps what a run came to.
     fn close(
         &self,
-        worker: Worker,
+        worker: &Worker,
         status: ExitStatus,
         tally: &mut Tally,
         progress: &Progress,
