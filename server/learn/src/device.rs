@@ -80,8 +80,8 @@ fn load_cuda() -> Result<(), String> {
 /// threads for each thread apart, so a new thread would start with one for each core. Freed
 /// memory of up to 32 MiB a block is kept, because giving it back and faulting it in again
 /// costs more than the arithmetic on it. Numbers below 1.2e-38 become zero: what they add is lost
-/// in any sum, and Intel's processors take a hundred times as long for them, which is where the
-/// moments of units that no longer learn and the probabilities of far pairs end up.
+/// in any sum, and Intel's processors take far longer for them (PERFORMANCE.md), which is where
+/// the moments of units that no longer learn and the probabilities of far pairs end up.
 pub fn init() {
     static ONCE: Once = Once::new();
     ONCE.call_once(keep_freed_memory);

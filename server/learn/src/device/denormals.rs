@@ -51,7 +51,7 @@ mod control {
     }
 }
 
-/// Other processors: denormals cost little there, and are kept.
+/// Other processors keep them: what they cost there was not measured.
 #[cfg(not(target_arch = "x86_64"))]
 mod control {
     pub(super) const FLUSH: u32 = 0;

@@ -157,13 +157,3 @@ fn other_settings_under_the_same_name_and_rows_of_another_revision_are_named() {
         "{told}"
     );
 }
-
-#[test]
-fn a_history_names_each_revision_that_took_part_once() {
-    let mut history = RunHistory::default();
-    for revision in ["abc", "abc", "def"] {
-        history.goes_on(&provenance(revision));
-    }
-    assert_eq!(history.revisions, ["abc", "def"]);
-    assert_eq!(history.machines, ["two cores"]);
-}
