@@ -31,6 +31,8 @@ pub struct Answered {
     /// Which query.
     pub key: QueryKey,
     /// `None` for a skip: no budget is used and a replacement is asked.
+    ///
+    /// Differs from B-Pref, where a skipped query uses the budget and is not replaced.
     pub preference: Option<Preference>,
     /// Gap-free number of the answer in its run, from 1; a later one supersedes an earlier
     /// one for the same query.

@@ -304,7 +304,7 @@ impl Run {
         let now = before + self.lanes.len() as u64;
         let actions = self.actions(before);
         let mut due = self.due(before, now);
-        let steering = self.steering(before, now);
+        let steering = self.steering(before);
         due.n_updates = due.n_updates.saturating_sub(u64::from(steering.is_some()));
         let observations = self.lanes.observations().to_vec();
         let has_reward = self.progress.n_fits > 0;
@@ -401,9 +401,12 @@ impl Run {
         self.preferences.n_preferred() < self.config.feedback.budget
     }
 
-    /// Whether the rewards are moved by the critics in the steps (before, now], and how.
-    fn steering(&self, before: u64, now: u64) -> Option<SteeringConfig> {
-        let is_due = |steering: &SteeringConfig| Every(steering.every).is_crossed(before, now);
+    /// Whether the rewards are moved by the critics on the way on from `step`, and how: after a
+    /// session that is due at the same step, so that the newest answers move them and no fit
+    /// follows at once.
+    fn steering(&self, step: u64) -> Option<SteeringConfig> {
+        let earlier = step.saturating_sub(self.lanes.len() as u64);
+        let is_due = |steering: &SteeringConfig| Every(steering.every).is_crossed(earlier, step);
         let may = self.progress.n_fits > 0 && self.has_budget();
         self.method.steering.filter(|s| may && is_due(s))
     }

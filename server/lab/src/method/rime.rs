@@ -9,8 +9,9 @@ use crate::config::RunConfig;
 pub(crate) fn rime(config: &RunConfig) -> Method {
     Method {
         reward_learner: |config| {
-            let sessions = config.feedback.sessions(config.training.total_steps);
-            Box::new(Denoising::new(&config.denoising, sessions.count() as u32))
+            let feedback = &config.feedback;
+            let n_sessions = feedback.budget.div_ceil(feedback.queries_per_session);
+            Box::new(Denoising::new(&config.denoising, n_sessions))
         },
         ..pebble(config)
     }

@@ -1,5 +1,7 @@
 //! What a run says of itself: evaluations, demonstrations, its phase, its end.
 
+use domain::schedule::Every;
+
 use super::{Outcome, Run, RunError};
 use crate::evaluate::{Trial, correlation, evaluate};
 use crate::message::{Activity, Demonstration, Evaluation, Event, Finished, Phase};
@@ -58,8 +60,9 @@ impl Run {
     }
 
     pub(super) fn finish(&mut self, events: &mut dyn FnMut(Event)) -> Result<Outcome, RunError> {
-        let (step, every) = (self.progress.step, self.config.evaluation.every);
-        let was_due = step > 0 && every > 0 && step.is_multiple_of(every);
+        let every = Every(self.config.evaluation.every);
+        let step = self.progress.step;
+        let was_due = every.is_crossed(step.saturating_sub(self.lanes.len() as u64), step);
         if !was_due || self.progress.last_evaluation.is_none() {
             self.evaluate(events)?;
         }

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::sync::mpsc::channel;
 
 use domain::teacher::{Oracle, Scripted};
+use learn::exploration::Novelty;
 
 use super::*;
 use crate::config::Layers;
@@ -84,17 +85,83 @@ fn mrn_steers_every_n_steps_by_the_latest_session_until_its_budget_is_spent() {
     let more = ["steering.every=200", "feedback.budget=16"];
     let mut trained = Trained::new("mrn", &more);
     let run = &mut trained.run;
-    assert!(run.steering(399, 400).is_some());
-    assert!(run.steering(400, 401).is_none() && run.steering(398, 399).is_none());
+    assert!(run.steering(400).is_some());
+    assert!(
+        run.steering(401).is_none() && run.steering(399).is_none() && run.steering(0).is_none()
+    );
     let latest = run.latest_answers();
     assert_eq!(latest, run.preferences.labeled(true)[8..]);
     assert_eq!(latest.len(), 4);
     run.progress.n_fits = 0;
-    assert!(run.steering(399, 400).is_none(), "no reward is learned yet");
+    assert!(run.steering(400).is_none(), "no reward is learned yet");
     let spent = Trained::new("mrn", &more[..1]);
-    assert!(spent.run.steering(399, 400).is_none());
+    assert!(spent.run.steering(400).is_none());
     let pebble = Trained::new("pebble", &[]);
-    assert!(pebble.run.steering(399, 400).is_none());
+    assert!(pebble.run.steering(400).is_none());
+}
+
+/// In Meta-World's settings every step that steers asks as well.
+#[test]
+fn mrn_steers_after_the_session_of_the_same_step() {
+    let more = |every| ["feedback.budget=16", every, "training.total_steps=303"];
+    let [at_session, never] = ["steering.every=300", "steering.every=1000"]
+        .map(|every| Trained::new("mrn", &more(every)).run.learner.fingerprint());
+    assert_ne!(
+        at_session, never,
+        "session 0, at step 300, has been fitted when it steers"
+    );
+}
+
+#[test]
+fn a_run_that_ends_beyond_a_multiple_is_tried_there_once() {
+    for (total, last) in [(700, 702), (702, 702)] {
+        let more = [
+            "environment.n_envs=3".to_owned(),
+            "evaluation.every=350".to_owned(),
+            format!("training.total_steps={total}"),
+        ];
+        let trained = Trained::new("uniform", &more.each_ref().map(String::as_str));
+        let metrics = std::fs::read_to_string(trained.folder.join("metrics.jsonl")).unwrap();
+        let events = metrics
+            .lines()
+            .map(|line| serde_json::from_str(line).unwrap());
+        let tried: Vec<u64> = events
+            .filter_map(|event| match event {
+                Event::Evaluation(evaluation) => Some(evaluation.step),
+                _ => None,
+            })
+            .collect();
+        assert_eq!(tried, [0, 351, last]);
+    }
+}
+
+#[test]
+fn rune_pays_for_disagreement_less_and_less_and_others_do_not() {
+    let rune = Trained::new("rune", &[]);
+    let paid = |step| f64::from(rune.run.batches(step).disagreement_weight);
+    // β₀ (1 − ρ)ᵗ with 0.05 and 1e-5, of environment steps
+    assert!((paid(0) - 0.05).abs() < 1e-9);
+    assert!((paid(100_000) - 0.05 * (1.0 - 1e-5_f64).powi(100_000)).abs() < 1e-8);
+    assert!(rune.run.replay.keeps_disagreement());
+    let pebble = Trained::new("pebble", &[]);
+    assert_eq!(pebble.run.batches(700).disagreement_weight, 0.0);
+    assert!(!pebble.run.replay.keeps_disagreement());
+}
+
+#[test]
+fn rime_keeps_its_critics_and_centres_novelty() {
+    let rime = Trained::new("rime", &[]);
+    let config = &rime.run.config;
+    assert!(!config.training.reset_critic);
+    assert_eq!(config.exploration.novelty, Novelty::Centred);
+}
+
+#[test]
+fn surf_adds_pairs_that_nobody_was_asked_about_for_every_query() {
+    for (method, per_query) in [("surf", 10), ("surf_whole", 10), ("pebble", 0)] {
+        let trained = Trained::new(method, &[]);
+        assert_eq!(trained.run.unlabeled(1).len(), per_query * 4, "{method}");
+    }
 }
 
 #[test]

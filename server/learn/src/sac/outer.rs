@@ -49,7 +49,7 @@ impl Sac {
         let mut rng = Rng::new(self.seed, Stream::Steering, self.n_updates);
         let noise = self.noise(batch.len() as i64, &mut rng);
         let target = self.bellman_target(&rows, &noise, self.temperature.alpha());
-        let rate = self.config.critic_learning_rate;
+        let rate = self.config.critic_learning_rate * self.rate();
 
         let (q, tape) = self.critic.net.forward_taped(&rows.state_action);
         let inner = self.critic.parameters.values.zeros_like();
