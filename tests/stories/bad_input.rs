@@ -124,7 +124,11 @@ fn a_policy_or_a_run_that_is_none_is_named() {
         here,
         &["walker-run", "no scripted expert", "random"],
     );
-    expect(&["train", "--resume", "nowhere"], here, &["nowhere"]);
+    expect(
+        &["train", "--resume", "nowhere"],
+        here,
+        &["nowhere", "holds no run"],
+    );
     expect(
         &["export", "--run", "1", "--data", "nowhere"],
         here,

@@ -118,4 +118,12 @@ fn a_run_that_was_training_when_the_server_was_killed_goes_on_by_itself() {
     });
     server.kill_and_restart();
     assert_eq!(server.finished(&run)["step"], 3000);
+
+    let history = data.path().join("runs").join(&run).join("history.json");
+    let history = std::fs::read(&history).expect("the run's history");
+    let history: Value = serde_json::from_slice(&history).expect("JSON");
+    for told_once in ["revisions", "machines"] {
+        assert_eq!(history[told_once].as_array().map(Vec::len), Some(1));
+    }
+    assert!(history["wall_s"].as_f64() > Some(0.0), "{history}");
 }

@@ -13,7 +13,6 @@ mod figure;
 mod golden;
 mod interrupt;
 mod openapi;
-mod provenance;
 mod render;
 mod serve;
 mod study;

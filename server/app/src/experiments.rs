@@ -8,7 +8,7 @@ use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use lab::experiment::Artifact;
-use lab::experiment::grid::{GridText, resolve};
+use lab::experiment::grid::{GridText, resolve, setting_names};
 use lab::experiment::report::{self, RowFile};
 use lab::experiment::results::{GridFolder, Results};
 use serde::Deserialize;
@@ -27,6 +27,10 @@ pub struct Experiment {
     pub about: String,
     /// JSON Lines.
     pub rows: String,
+    /// What is wrong with the rows, where they cannot be read.
+    pub damage: Option<String>,
+    /// Its settings, in the order of its file.
+    pub settings: Vec<String>,
     /// Where it is, while it runs.
     pub progress: Option<Progress>,
     /// Whether it came with the program.
@@ -75,7 +79,7 @@ pub fn all(data: &Path) -> Vec<Experiment> {
         .filter(|(name, _, _)| !names.iter().any(|own| own == name))
         .map(|(name, grid, rows)| Experiment {
             is_shipped: true,
-            ..described(name, grid, (*rows).to_owned(), None)
+            ..described(name, grid, Ok((*rows).to_owned()), None)
         });
     own.chain(shipped).collect()
 }
@@ -90,17 +94,16 @@ pub fn find(data: &Path, name: &str) -> Option<Experiment> {
 fn open(data: &Path, name: &str) -> Experiment {
     let root = data.join("experiments").join(name);
     let text = |file: &str| std::fs::read_to_string(root.join(file)).unwrap_or_default();
+    let rows = match std::fs::read_to_string(root.join("results.jsonl")) {
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(String::new()),
+        read => read.map_err(|error| format!("results.jsonl of {name}: {error}")),
+    };
     let progress = serde_json::from_str::<Progress>(&text("progress.json")).ok();
     let progress = progress.map(|progress| Progress {
         is_up: is_held(&root),
         ..progress
     });
-    described(
-        name,
-        &text("experiment.toml"),
-        text("results.jsonl"),
-        progress,
-    )
+    described(name, &text("experiment.toml"), rows, progress)
 }
 
 /// Whether a start of the experiment, or a run of it, is up.
@@ -112,26 +115,41 @@ fn is_held(root: &Path) -> bool {
     log.is_ok_and(|log| matches!(log.try_lock(), Err(std::fs::TryLockError::WouldBlock)))
 }
 
-fn described(name: &str, grid: &str, rows: String, progress: Option<Progress>) -> Experiment {
-    let grid = resolve(GridText { name, text: grid }, false);
-    let (title, about) = grid.map_or_else(
+fn described(
+    name: &str,
+    grid: &str,
+    rows: Result<String, String>,
+    progress: Option<Progress>,
+) -> Experiment {
+    let source = GridText { name, text: grid };
+    let (title, about) = resolve(source, false).map_or_else(
         |_| (name.to_owned(), String::new()),
         |grid| (grid.title, grid.about),
     );
+    let (rows, damage) = match rows {
+        Ok(rows) => {
+            let damage = Results::parse(name, &rows).err();
+            (rows, damage.map(|error| error.to_string()))
+        }
+        Err(damage) => (String::new(), Some(damage)),
+    };
     Experiment {
         name: name.to_owned(),
         title,
         about,
         rows,
+        damage,
+        settings: setting_names(source),
         progress,
         is_shipped: false,
     }
 }
 
 impl Experiment {
-    /// Runs that are over.
-    pub fn n_finished(&self) -> usize {
-        Results::parse(&self.name, &self.rows).map_or(0, |results| results.runs.len())
+    /// Runs that are over, and those that failed with the reason of each; none of rows that are
+    /// damaged.
+    pub fn results(&self) -> Results {
+        Results::parse(&self.name, &self.rows).unwrap_or_default()
     }
 
     /// The report; empty before the first run is over. Made anew when there are new rows.
@@ -141,7 +159,10 @@ impl Experiment {
     pub fn report(&self) -> Result<Arc<Vec<Artifact>>, String> {
         type Made = (String, Arc<Vec<Artifact>>);
         static MADE: Mutex<BTreeMap<String, Made>> = Mutex::new(BTreeMap::new());
-        if self.n_finished() == 0 {
+        if let Some(damage) = &self.damage {
+            return Err(damage.clone());
+        }
+        if self.results().runs.is_empty() {
             return Ok(Arc::default());
         }
         let mut made = MADE.lock().unwrap_or_else(PoisonError::into_inner);
@@ -153,6 +174,7 @@ impl Experiment {
         let file = RowFile {
             name: self.name.clone(),
             text: self.rows.clone(),
+            settings: self.settings.clone(),
         };
         let report = Arc::new(report::make(&[file], true).map_err(|error| error.to_string())?);
         made.insert(self.name.clone(), (self.rows.clone(), Arc::clone(&report)));
@@ -167,7 +189,7 @@ mod tests {
     #[test]
     fn what_comes_with_the_program_can_be_reported() {
         for (name, grid, rows) in SHIPPED {
-            let experiment = described(name, grid, (*rows).to_owned(), None);
+            let experiment = described(name, grid, Ok((*rows).to_owned()), None);
             assert_ne!(experiment.title, *name, "experiment.toml of {name}");
             let report = experiment
                 .report()
@@ -181,8 +203,19 @@ mod tests {
         let data = tempfile::tempdir().unwrap();
         std::fs::create_dir_all(data.path().join("experiments/mine")).unwrap();
         let mine = find(data.path(), "mine").unwrap();
-        assert_eq!((mine.n_finished(), mine.progress.clone()), (0, None));
+        assert_eq!(
+            (mine.results(), mine.progress.clone()),
+            (Results::default(), None)
+        );
         assert!(mine.report().unwrap().is_empty());
         assert!(find(data.path(), "..").is_none());
+
+        let rows = data.path().join("experiments/mine/results.jsonl");
+        for (damaged, told) in [(&b"{}\n"[..], "line 1"), (b"\xff\n", "UTF-8")] {
+            std::fs::write(&rows, damaged).unwrap();
+            let mine = find(data.path(), "mine").unwrap();
+            let error = mine.report().unwrap_err();
+            assert!(error.contains("mine") && error.contains(told), "{error}");
+        }
     }
 }

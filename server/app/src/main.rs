@@ -21,6 +21,7 @@ mod live;
 mod pages;
 mod policy;
 mod problem;
+mod provenance;
 mod router;
 mod state;
 mod study_results;

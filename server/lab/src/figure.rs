@@ -26,8 +26,9 @@ mod timestep_classifier;
 pub use curves::points as curve_points;
 pub use preferences::{PreferenceRow, Preferred};
 pub use rows::{CurveRow, rows_of_run};
+pub use seeds::Between;
 pub(crate) use seeds::LEAST_FOR_INTERVAL;
-pub use stage_gaps::points as stage_gap_points;
+pub(crate) use stage_gaps::{GAPS, RATIOS};
 pub use strips::{Shot, StripRow};
 
 /// A file of results, read: JSON Lines.
@@ -50,6 +51,8 @@ pub struct Request<'a> {
     pub y: Option<&'a str>,
     /// How several seeds become one line, where the figure leaves a choice.
     pub center: Option<&'a str>,
+    /// What a seed counts for between two of its points, in curves.
+    pub between: Between,
 }
 
 /// A line of the registry.
@@ -76,6 +79,7 @@ pub const FIGURES: &[FigureEntry] = &[
     same_stage_bars::ENTRY,
     stage_map::ENTRY,
     stage_gaps::ENTRY,
+    stage_gaps::RATIOS_ENTRY,
     temporal_map::ENTRY,
     strips::ENTRY,
     timestep_classifier::ENTRY,

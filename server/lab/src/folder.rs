@@ -62,6 +62,11 @@ impl RunFolder {
     /// # Errors
     /// When there is none or it cannot be read.
     pub(crate) fn open(root: &Path) -> Result<(Self, String), RunError> {
+        if !Self::holds_run(root) {
+            return Err(RunError::NoRun {
+                folder: root.to_owned(),
+            });
+        }
         let path = root.join("config.toml");
         let config =
             fs::read_to_string(&path).map_err(io_error("read the run's settings", &path))?;

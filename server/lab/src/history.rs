@@ -1,15 +1,18 @@
 //! Who worked on a run, and for how long: `history.json` in its folder, across stops and kills.
 
 use std::fs;
+use std::io;
 use std::path::Path;
 use std::time::Instant;
 
 use serde::{Deserialize, Serialize};
 
-use crate::folder::write_durably;
+use crate::folder::{io_error, write_durably};
 use crate::run::RunError;
 
 const FILE: &str = "history.json";
+/// What cannot be read, kept for whoever wants to mend it.
+const SET_ASIDE: &str = "history.damaged.json";
 
 /// Where a run is computed.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -27,17 +30,25 @@ pub struct RunHistory {
     pub revisions: Vec<String>,
     /// Machines, in order, each once.
     pub machines: Vec<String>,
-    /// Wall time so far, seconds; of a part that was killed, up to its last checkpoint.
+    /// Wall time so far, seconds, waiting for answers included; of a part that was killed, up to
+    /// its last checkpoint.
     pub wall_s: f64,
 }
 
 impl RunHistory {
     /// What the run's folder knows; nothing of a run that was never started.
-    pub fn of(folder: &Path) -> Self {
-        let text = fs::read_to_string(folder.join(FILE));
-        text.ok()
-            .and_then(|text| serde_json::from_str(&text).ok())
-            .unwrap_or_default()
+    ///
+    /// # Errors
+    /// When its history cannot be read.
+    pub fn of(folder: &Path) -> Result<Self, RunError> {
+        let path = folder.join(FILE);
+        match fs::read(&path) {
+            Ok(text) => serde_json::from_slice(&text)
+                .map_err(io::Error::from)
+                .map_err(io_error("read the run's history", &path)),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(Self::default()),
+            Err(error) => Err(io_error("read the run's history", &path)(error)),
+        }
     }
 
     /// Notes who goes on with the run now.
@@ -61,7 +72,8 @@ pub struct Sitting<'a> {
 }
 
 impl<'a> Sitting<'a> {
-    /// Goes on with a run, and keeps who does.
+    /// Goes on with a run, and keeps who does. A history that is damaged does not hold a run
+    /// up: it is set aside, and what was wrong with it returned for the person who reads the log.
     ///
     /// * `began` – when its process did
     ///
@@ -74,8 +86,19 @@ impl<'a> Sitting<'a> {
         folder: &'a Path,
         provenance: &Provenance,
         began: Instant,
-    ) -> Result<Self, RunError> {
-        let mut before = RunHistory::of(folder);
+    ) -> Result<(Self, Option<String>), RunError> {
+        let (mut before, complaint) = match RunHistory::of(folder) {
+            Ok(before) => (before, None),
+            Err(damage) => {
+                let aside = folder.join(SET_ASIDE);
+                let set_aside = fs::rename(folder.join(FILE), &aside);
+                set_aside.map_err(io_error("set the run's history aside", &aside))?;
+                let complaint = format!(
+                    "{damage}. It is {SET_ASIDE} now; time and revisions are counted anew from here"
+                );
+                (RunHistory::default(), Some(complaint))
+            }
+        };
         before.goes_on(provenance);
         let sitting = Self {
             folder,
@@ -83,7 +106,7 @@ impl<'a> Sitting<'a> {
             began,
         };
         sitting.keep()?;
-        Ok(sitting)
+        Ok((sitting, complaint))
     }
 
     /// The whole so far.
@@ -123,13 +146,15 @@ mod tests {
         let earlier = Instant::now().checked_sub(Duration::from_secs(100));
         let earlier = earlier.unwrap();
         for (revision, least) in [("a", 100.0), ("a", 200.0), ("b", 300.0)] {
-            let sitting = Sitting::begin(folder.path(), &of(revision), earlier).unwrap();
+            let (sitting, complaint) =
+                Sitting::begin(folder.path(), &of(revision), earlier).unwrap();
+            assert_eq!(complaint, None);
             sitting.keep().unwrap();
-            let kept = RunHistory::of(folder.path());
+            let kept = RunHistory::of(folder.path()).unwrap();
             assert!(kept.wall_s >= least, "{kept:?}");
             assert!(kept.wall_s <= sitting.history().wall_s);
         }
-        let kept = RunHistory::of(folder.path());
+        let kept = RunHistory::of(folder.path()).unwrap();
         assert_eq!(kept.revisions, ["a", "b"]);
         assert_eq!(kept.machines, ["two cores"]);
     }
@@ -137,6 +162,29 @@ mod tests {
     #[test]
     fn a_run_that_was_never_started_has_none() {
         let folder = tempfile::tempdir().unwrap();
-        assert_eq!(RunHistory::of(folder.path()), RunHistory::default());
+        let none = RunHistory::of(folder.path()).unwrap();
+        assert_eq!(none, RunHistory::default());
+    }
+
+    #[test]
+    fn a_damaged_history_is_named_and_set_aside() {
+        let folder = tempfile::tempdir().unwrap();
+        let damaged = r#"{"revisions": ["a"], "machines": ["two co"#;
+        fs::write(folder.path().join(FILE), damaged).unwrap();
+        let error = RunHistory::of(folder.path()).unwrap_err().to_string();
+        assert!(error.contains(FILE) && error.contains("line 1"), "{error}");
+
+        let provenance = Provenance {
+            revision: "b".into(),
+            machine: "two cores".into(),
+        };
+        let (sitting, complaint) =
+            Sitting::begin(folder.path(), &provenance, Instant::now()).unwrap();
+        let complaint = complaint.unwrap();
+        assert!(complaint.contains(SET_ASIDE), "{complaint}");
+        let aside = fs::read_to_string(folder.path().join(SET_ASIDE)).unwrap();
+        assert_eq!(aside, damaged);
+        assert_eq!(sitting.history().revisions, ["b"]);
+        assert_eq!(RunHistory::of(folder.path()).unwrap().revisions, ["b"]);
     }
 }

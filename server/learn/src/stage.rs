@@ -29,6 +29,11 @@ impl StageApproximator {
         self != Self::Timestep
     }
 
+    /// Whether its gaps are shares of an interval, in [0, 1], rather than nats.
+    pub fn is_of_intervals(self) -> bool {
+        matches!(self, Self::Intervals | Self::Timestep)
+    }
+
     /// Gap of each query, `[N]`; nats for the quadrilaterals, [0, 1] for intervals. Empty
     /// without the temporal distance that it needs.
     ///

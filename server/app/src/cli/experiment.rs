@@ -11,6 +11,7 @@ use lab::experiment::{self, EXPERIMENTS, Settings};
 
 use super::BadInput;
 use super::figure::{Format, encode, write};
+use crate::provenance::processors;
 
 mod check;
 mod pool;
@@ -116,10 +117,6 @@ fn write_with_picture(path: &Path, text: String) -> anyhow::Result<()> {
         println!("{}", picture.display());
     }
     Ok(())
-}
-
-pub(super) fn processors() -> NonZeroUsize {
-    std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN)
 }
 
 /// A grid as the command line names it, with its text and a short name for its folder.

@@ -87,6 +87,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         x: args.x.as_deref(),
         y: args.y.as_deref(),
         center: args.center.as_deref(),
+        ..Request::default()
     };
     let svg = figure::make(figure, &request).map_err(BadInput::from_error)?;
     write(&args.out, &encode(svg, format, args.scale)?)?;

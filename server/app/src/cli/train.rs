@@ -14,8 +14,9 @@ use lab::message::{Command, Event};
 use lab::run::{Outcome, Run};
 use serde_json::json;
 
+use super::BadInput;
 use super::interrupt::on_interrupt;
-use super::{BadInput, provenance};
+use crate::provenance;
 
 /// Train an agent with a scripted teacher.
 #[derive(Debug, clap::Args)]
@@ -80,7 +81,11 @@ pub struct Args {
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let started = Instant::now();
     let (mut run, folder) = open(&args)?;
-    let sitting = Sitting::begin(&folder, &provenance::here(&run.config().device), started)?;
+    let here = provenance::here(&run.config().device);
+    let (sitting, complaint) = Sitting::begin(&folder, &here, started)?;
+    if let Some(complaint) = complaint {
+        eprintln!("{complaint}");
+    }
     let judge = judge(&args.teacher, run.config().seed, &run.config().teacher)?;
     let mut teacher = Scripted::new(judge, run.consumed_sequence());
     let (sender, commands) = channel();

@@ -4,10 +4,12 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::Receiver;
 use std::sync::{Arc, Mutex};
+use std::time::Instant;
 
 use anyhow::Context as _;
 use domain::teacher::{Scripted, Teacher};
 use lab::config::RunConfig;
+use lab::history::Sitting;
 use lab::message::{Command, Event, Phase};
 use lab::run::{Outcome, Run};
 use serde_json::{Value, json};
@@ -16,6 +18,7 @@ use store::{RunId, RunRow};
 use super::human_teacher::HumanTeacher;
 use super::state_line::{StateKind, StateLine};
 use super::{Inner, LiveEvent, Now, lock, panic_text};
+use crate::provenance;
 
 /// Who answers a run, as `POST /api/v1/runs` names it: people at their pages.
 pub const HUMAN: &str = "human";
@@ -59,15 +62,31 @@ impl Driver {
     }
 
     fn drive(&self, commands: &Receiver<Command>) -> anyhow::Result<StateLine> {
+        let began = Instant::now();
         self.show(&StateLine::opening());
         let row = self
             .wait(self.inner.store.run(self.run))?
             .context("the store does not know this run")?;
         let mut run = self.open(&row)?;
         let config = run.config().clone();
+        let folder = self.inner.store.run_folder(self.run);
+        let here = provenance::here(&config.device);
+        let (sitting, complaint) = Sitting::begin(&folder, &here, began)?;
+        if let Some(complaint) = complaint {
+            tracing::warn!(run.id = %self.run, "{complaint}");
+            self.log(&json!({"kind": "damaged_history", "complaint": complaint}));
+        }
         let mut teacher = self.teacher(&row, &run)?;
-        let mut hear = |event| self.hear(event, &row, &config);
-        match run.drive(teacher.as_mut(), commands, &mut hear)? {
+        let mut kept = Ok(());
+        let outcome = run.drive(teacher.as_mut(), commands, &mut |event| {
+            if matches!(event, Event::Checkpointed(_)) {
+                kept = sitting.keep();
+            }
+            self.hear(event, &row, &config);
+        })?;
+        kept?;
+        sitting.keep()?;
+        match outcome {
             Outcome::Finished(finished) => Ok(StateLine::finished(&finished)),
             Outcome::Stopped => Ok(StateLine::stopped(run.step())),
         }

@@ -31,6 +31,8 @@ struct ExperimentPage {
     n_over: usize,
     n_runs: usize,
     running: Vec<RunLine>,
+    /// Runs that could not go on, with why, while no report tells them.
+    failed: Vec<(String, String)>,
     figures: Vec<Figure>,
     /// HTML.
     tables: String,
@@ -62,6 +64,10 @@ const FIGURES: &[(&str, &str)] = &[
     (
         "stage-gaps.svg",
         "Stage gap of chosen pairs and of all candidates",
+    ),
+    (
+        "stage-gap-ratios.svg",
+        "Stage gap of chosen pairs by that of all candidates",
     ),
 ];
 
@@ -139,6 +145,12 @@ fn filled(experiment: &Experiment, report: &[Artifact]) -> ExperimentPage {
         running: up.map_or_else(Vec::new, |progress| {
             progress.running.iter().map(run_line).collect()
         }),
+        failed: if report.is_empty() {
+            let failed = experiment.results().failed.into_iter();
+            failed.map(|(key, reason)| (key.name(), reason)).collect()
+        } else {
+            Vec::new()
+        },
         figures: figures
             .map(|(svg, title)| Figure {
                 svg,

@@ -64,10 +64,20 @@ fn line(experiment: &Experiment) -> Line {
 
 /// How many runs are over, in words.
 pub(super) fn state(experiment: &Experiment) -> String {
-    let n = thousands(experiment.n_finished() as u64);
-    match &experiment.progress {
-        Some(progress) if progress.is_up => format!("{n} of {} runs, working", progress.n_runs),
+    if experiment.damage.is_some() {
+        return "its results cannot be read".to_owned();
+    }
+    let results = experiment.results();
+    let n = thousands(results.runs.len() as u64);
+    let mut state = match &experiment.progress {
         Some(progress) => format!("{n} of {} runs", progress.n_runs),
         None => format!("{n} runs"),
+    };
+    if !results.failed.is_empty() {
+        state += &format!(", {} failed", results.failed.len());
     }
+    if experiment.progress.as_ref().is_some_and(|p| p.is_up) {
+        state += ", working";
+    }
+    state
 }

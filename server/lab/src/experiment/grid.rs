@@ -86,6 +86,16 @@ impl RunKey {
     }
 }
 
+/// Settings as a file of a grid names them, in its order; none where it cannot be read.
+pub fn setting_names(source: GridText) -> Vec<String> {
+    let file = GridFile::parse(source);
+    let settings = file.map(|file| file.setting).unwrap_or_default();
+    let names = settings
+        .into_iter()
+        .map(|setting| setting.name.into_inner());
+    names.collect()
+}
+
 /// A setting's name as folders have it.
 fn folder_part(setting: &str) -> String {
     setting.chars().map(in_a_name).collect()
@@ -341,22 +351,19 @@ impl Reader<'_> {
         let Some(seeds) = &axes.seeds else {
             return Ok(vec![1]);
         };
-        let list = seeds.get_ref().list();
-        if list.is_empty() {
+        let n_seeds = seeds.get_ref().n();
+        if n_seeds == 0 {
             return Err(GridError::Empty {
                 file: self.source.name.to_owned(),
                 line: self.line(seeds.span().start),
                 axis: "seeds",
             });
         }
-        if list.len() > MOST_RUNS {
+        if n_seeds > MOST_RUNS {
             let file = self.source.name.to_owned();
-            return Err(GridError::TooMany {
-                file,
-                n: list.len(),
-            });
+            return Err(GridError::TooMany { file, n: n_seeds });
         }
-        Ok(list)
+        Ok(seeds.get_ref().list())
     }
 
     fn layers(

@@ -4,11 +4,13 @@
 
 use std::collections::BTreeSet;
 
+use domain::teacher::SCRIPTED;
+
 use super::Artifact;
 use super::grid::RunKey;
 use super::results::{Content, Results, Row, RunResult};
 use crate::config::ConfigError;
-use crate::figure::{self, CurveRow, FigureError, Request, Source};
+use crate::figure::{self, Between, CurveRow, FigureError, Request, Source};
 use crate::message::SessionOffered;
 
 mod comparable;
@@ -24,6 +26,8 @@ pub struct RowFile {
     pub name: String,
     /// JSON Lines.
     pub text: String,
+    /// Settings in the order in which tables and keys are to name them; others come after these.
+    pub settings: Vec<String>,
 }
 
 /// Why there is no report.
@@ -36,8 +40,13 @@ pub enum ReportError {
     #[error(transparent)]
     Figure(#[from] FigureError),
     /// Nothing is finished yet.
-    #[error("{0} has no finished run to report")]
-    Nothing(String),
+    #[error("{files} has no finished run to report{failed}")]
+    Nothing {
+        /// The files.
+        files: String,
+        /// Runs that failed, in words; empty where none did.
+        failed: String,
+    },
     /// Files whose runs share no task.
     #[error(
         "{first} is of {first_tasks} and {second} of {second_tasks}: runs of different tasks cannot be compared; report them apart"
@@ -62,7 +71,7 @@ pub enum ReportError {
         /// Another.
         second: String,
         /// In what they differ.
-        what: &'static str,
+        what: String,
         /// Of the first.
         there: String,
         /// Of the second.
@@ -117,10 +126,13 @@ pub fn make(files: &[RowFile], may_mix: bool) -> Result<Vec<Artifact>, ReportErr
         .iter()
         .flat_map(|(_, results)| results.failed.clone())
         .collect();
-    let runs = read
+    let mut runs: Vec<RunResult> = read
         .into_iter()
         .flat_map(|(_, results)| results.runs)
         .collect();
+    // By what they are, not by which came to its end first.
+    let settings: Vec<&String> = files.iter().flat_map(|file| &file.settings).collect();
+    runs.sort_by_cached_key(|run| place(&run.key, &settings));
     let runs = Runs { runs, failed };
     let mut artifacts = vec![
         Artifact::new("report.md", table::markdown(&runs)),
@@ -147,22 +159,46 @@ pub fn make(files: &[RowFile], may_mix: bool) -> Result<Vec<Artifact>, ReportErr
                 ("return-by-budget.svg", "return-by-budget.csv"),
             ]
         };
-        artifacts.extend(curves(names[0], &evaluation_rows(&of_kind), y, "step")?);
+        artifacts.extend(curves(
+            names[0],
+            &evaluation_rows(&of_kind),
+            ("step", y),
+            Between::Line,
+        )?);
         let by_budget = budget_rows(&of_kind);
         if !by_budget.is_empty() {
-            artifacts.extend(curves(names[1], &by_budget, y, "labels")?);
+            artifacts.extend(curves(
+                names[1],
+                &by_budget,
+                ("labels", y),
+                Between::Nothing,
+            )?);
         }
     }
     artifacts.extend(stage_gaps(&runs)?);
     Ok(artifacts)
 }
 
+/// Where a run stands: tasks and teachers in the registries' order, settings as their file says.
+fn place(key: &RunKey, settings: &[&String]) -> impl Ord + use<> {
+    let among = |found: Option<usize>| found.unwrap_or(usize::MAX);
+    let task = sim::tasks::tasks().iter().position(|t| t.name == key.task);
+    let setting = settings.iter().position(|known| **known == key.setting);
+    let teacher = SCRIPTED.iter().position(|(name, _)| *name == key.teacher);
+    (
+        among(task),
+        among(setting),
+        among(teacher),
+        key.clone(), // settings that no file names by name, then method and seed
+    )
+}
+
 /// A figure of curves, the interquartile mean over seeds, with all its points.
 fn curves(
     (svg, csv): (&'static str, &'static str),
     rows: &[CurveRow],
-    y: &str,
-    x: &str,
+    (x, y): (&str, &str),
+    between: Between,
 ) -> Result<[Artifact; 2], FigureError> {
     let sources = [Source {
         name: svg.to_owned(),
@@ -173,6 +209,7 @@ fn curves(
         x: Some(x),
         y: Some(y),
         center: Some("iqm"),
+        between,
     };
     Ok([
         Artifact::new(svg, figure::make(figure::find("curves")?, &request)?),
@@ -225,7 +262,7 @@ fn budget_rows(runs: &[&RunResult]) -> Vec<CurveRow> {
     runs.iter().filter(is_one_of_several).map(row).collect()
 }
 
-/// The figure of stage gaps, where any method has them.
+/// The figures of stage gaps, where any method has them.
 fn stage_gaps(runs: &Runs) -> Result<Vec<Artifact>, FigureError> {
     let sessions = runs.runs.iter().flat_map(|run| {
         let row = |session: &SessionOffered| Row {
@@ -242,14 +279,25 @@ fn stage_gaps(runs: &Runs) -> Result<Vec<Artifact>, FigureError> {
         sources: &sources,
         ..Request::default()
     };
-    match figure::make(figure::find("stage-gaps")?, &request) {
-        Ok(svg) => Ok(vec![
-            Artifact::new("stage-gaps.svg", svg),
-            Artifact::new("stage-gaps.csv", figure::stage_gap_points(&request)?),
-        ]),
-        Err(FigureError::NoRows { .. }) => Ok(Vec::new()),
-        Err(error) => Err(error),
+    let mut artifacts = Vec::new();
+    for (figure, svg, csv) in [
+        (figure::GAPS, "stage-gaps.svg", "stage-gaps.csv"),
+        (
+            figure::RATIOS,
+            "stage-gap-ratios.svg",
+            "stage-gap-ratios.csv",
+        ),
+    ] {
+        match figure.draw(&request) {
+            Ok(drawn) => {
+                artifacts.push(Artifact::new(svg, drawn));
+                artifacts.push(Artifact::new(csv, figure.points(&request)?));
+            }
+            Err(FigureError::NoRows { .. }) => {}
+            Err(error) => return Err(error),
+        }
     }
+    Ok(artifacts)
 }
 
 impl Group {

@@ -12,8 +12,11 @@ use crate::message::{Evaluation, Event, SessionOffered};
 use crate::method;
 
 mod folder;
+mod settings;
 
 pub use folder::{GridFolder, Misfit, StoreError};
+pub use settings::fingerprint;
+pub(crate) use settings::first_difference;
 
 /// One line of `results.jsonl`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -62,8 +65,12 @@ pub struct RunRow {
     pub has_success: bool,
     /// Fingerprint of the final weights: equal for bit-identical runs.
     pub weights: String,
-    /// Fingerprint of the resolved settings, which lie beside as `settings/FINGERPRINT.toml`.
+    /// Fingerprint of the resolved settings.
     pub settings: String,
+    /// The resolved settings themselves; empty in rows of the program's first revisions, whose
+    /// settings lie beside as `settings/FINGERPRINT.toml`.
+    #[serde(default)]
+    pub config: toml::Table,
     /// Of the program, `A then B` where it changed in between.
     pub revision: String,
     /// Processor and cores of the machine.
@@ -107,6 +114,7 @@ pub fn rows_of_run(
                     has_success: (find_task(&config.task)?.spec)().has_success,
                     weights: f.weights,
                     settings: fingerprint(config),
+                    config: settings::table(config),
                     revision: history.revisions.join(" then "),
                     machine: history.machines.join(" then "),
                     wall_s: history.wall_s,
@@ -117,21 +125,6 @@ pub fn rows_of_run(
         }
     }
     Ok(None)
-}
-
-/// Of resolved settings without their seed, so that the seeds of a group share it: 16
-/// hexadecimal digits, FNV-1a.
-pub fn fingerprint(config: &RunConfig) -> String {
-    let text = without_seed(config).to_toml();
-    let mix = |hash: u64, byte: u8| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
-    format!("{:016x}", text.bytes().fold(0xcbf2_9ce4_8422_2325, mix))
-}
-
-fn without_seed(config: &RunConfig) -> RunConfig {
-    RunConfig {
-        seed: 0,
-        ..config.clone()
-    }
 }
 
 /// A file of rows, read.
@@ -210,6 +203,27 @@ impl Results {
     /// The finished run of that key.
     pub fn run(&self, key: &RunKey) -> Option<&RunResult> {
         self.runs.iter().find(|run| run.key == *key)
+    }
+}
+
+impl RunResult {
+    /// The resolved settings, with what settings that came later were by default; `None` for a
+    /// row of before settings stood in rows.
+    ///
+    /// # Errors
+    /// Settings that this program does not know.
+    pub fn config(&self) -> Result<Option<RunConfig>, ConfigError> {
+        if self.end.config.is_empty() {
+            return Ok(None);
+        }
+        let origin = format!("the settings of {}", self.key.name());
+        match toml::to_string(&self.end.config) {
+            Ok(text) => RunConfig::parse(&origin, &text).map(Some),
+            Err(error) => Err(ConfigError::Invalid {
+                origin,
+                message: error.to_string(),
+            }),
+        }
     }
 }
 

@@ -3,7 +3,7 @@
 use domain::agreement::mean;
 
 use super::plot::{Entry, Frame, Labels, Panel, Pen, Scale, Sheet, Svg, series};
-use super::seeds::{BAND, Curve, draw_seeds, in_order_of_appearance};
+use super::seeds::{BAND, Between, Curve, draw_seeds, in_order_of_appearance};
 use super::{FigureEntry, FigureError, Request, read_rows};
 use crate::experiment::abstract_mdp::{Outcome, Selection, over_seeds};
 
@@ -86,7 +86,7 @@ fn draw_rewards(svg: &mut Svg, frame: Frame, bias: f64, groups: &[Vec<Curve>]) {
         y: "Normalised episode reward",
     };
     panel.draw_axes(svg, labels);
-    draw_seeds(svg, &panel, groups, mean);
+    draw_seeds(svg, &panel, groups, mean, Between::Line);
 }
 
 /// Means with their intervals, the biases at equal distances: they span from 0 to hundreds.

@@ -1,8 +1,11 @@
-//! Learning curves: one panel a task, one line a method, every seed thin behind.
+//! Learning curves: one panel a task, one line a method, every seed thin behind. Where several
+//! methods are there in several settings each setting has a panel of its own.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
-use super::seeds::{Curve, SeedSheet, add_line, drawn_lines, in_order_of_appearance, quoted};
+use super::seeds::{
+    Between, Curve, SeedSheet, add_line, drawn_lines, in_order_of_appearance, quoted,
+};
 use super::{
     Center, CurveRow, FigureEntry, FigureError, Request, choose, make_center, read_rows,
     shown_method,
@@ -19,8 +22,15 @@ pub(super) const ENTRY: FigureEntry = FigureEntry {
 
 type Column = fn(&CurveRow) -> f64;
 
-/// Method and setting: what shares a line.
-type Group = (String, String);
+/// Method and setting: what shares a line. No setting where panels tell it.
+type Group = (String, Option<String>);
+
+/// What a panel shows: a task, in one setting or in all.
+#[derive(PartialEq)]
+struct Shown {
+    task: String,
+    setting: Option<String>,
+}
 
 /// What the axes show.
 #[derive(Clone, Copy)]
@@ -34,8 +44,9 @@ struct Axes {
 struct Plan {
     axes: Axes,
     center: Center,
+    between: Between,
     rows: Vec<CurveRow>,
-    tasks: Vec<String>,
+    panels: Vec<Shown>,
     groups: Vec<Group>,
 }
 
@@ -59,17 +70,39 @@ impl Plan {
         Ok(Self {
             axes,
             center,
-            tasks: in_order_of_appearance(rows.iter().map(|row| row.task.clone())),
+            between: request.between,
+            panels: panels(&rows),
             groups: groups(&rows),
             rows,
         })
     }
 
-    /// The curves of each group on a task, each with its seed.
-    fn curves(&self, task: &str) -> Result<Vec<Vec<(u64, Curve)>>, FigureError> {
-        let rows: Vec<&CurveRow> = self.rows.iter().filter(|row| row.task == task).collect();
+    /// The curves of each group in a panel, each with its seed.
+    fn curves(&self, panel: &Shown) -> Result<Vec<Vec<(u64, Curve)>>, FigureError> {
+        let rows: Vec<&CurveRow> = self.rows.iter().filter(|row| panel.shows(row)).collect();
         let of_group = |group| curves(&rows, group, self.axes);
         self.groups.iter().map(of_group).collect()
+    }
+
+    /// Over a panel: its task, and the setting where the task has several.
+    fn title(&self, panel: &Shown) -> String {
+        let is_of_task = |other: &&Shown| other.task == panel.task;
+        let n = self.panels.iter().filter(is_of_task).count();
+        match panel
+            .setting
+            .as_deref()
+            .filter(|setting| n > 1 && !setting.is_empty())
+        {
+            Some(setting) => format!("{}, {setting}", panel.task),
+            None => panel.task.clone(),
+        }
+    }
+}
+
+impl Shown {
+    fn shows(&self, row: &CurveRow) -> bool {
+        let is_setting = |setting: &String| *setting == row.setting;
+        row.task == self.task && self.setting.as_ref().is_none_or(is_setting)
     }
 }
 
@@ -83,14 +116,15 @@ fn make(request: &Request) -> Result<String, FigureError> {
         y: axes.y.0,
         is_rate: axes.is_rate,
         center: plan.center,
+        between: plan.between,
     };
-    let panel = |task: &String| {
+    let panel = |shown: &Shown| {
         let alone = |(_, curve)| curve;
-        let groups = plan.curves(task)?.into_iter();
+        let groups = plan.curves(shown)?.into_iter();
         let groups = groups.map(|seeds| seeds.into_iter().map(alone).collect());
-        Ok((task.clone(), groups.collect()))
+        Ok((plan.title(shown), groups.collect()))
     };
-    let panels = plan.tasks.iter().map(panel);
+    let panels = plan.panels.iter().map(panel);
     let panels = panels.collect::<Result<Vec<_>, FigureError>>()?;
     let title = format!("{} over {}, by method", axes.y.0, axes.x.0.to_lowercase());
     Ok(sheet.draw(&panels, &title))
@@ -104,14 +138,17 @@ fn make(request: &Request) -> Result<String, FigureError> {
 pub fn points(request: &Request) -> Result<String, FigureError> {
     let plan = Plan::of(request)?;
     let mut csv = String::from("task,method,setting,line,x,y\n");
-    for task in &plan.tasks {
-        for ((method, setting), seeds) in plan.groups.iter().zip(plan.curves(task)?) {
-            let named = |line: String| format!("{task},{method},{},{line}", quoted(setting));
+    for panel in &plan.panels {
+        let task = &panel.task;
+        for ((method, setting), seeds) in plan.groups.iter().zip(plan.curves(panel)?) {
+            let setting = setting.as_ref().or(panel.setting.as_ref());
+            let setting = quoted(setting.map_or("", String::as_str));
+            let named = |line: String| format!("{task},{method},{setting},{line}");
             for (seed, curve) in &seeds {
                 add_line(&mut csv, &named(format!("seed {seed}")), curve);
             }
             let curves: Vec<Curve> = seeds.into_iter().map(|(_, curve)| curve).collect();
-            for (line, curve) in drawn_lines(&curves, plan.center) {
+            for (line, curve) in drawn_lines(&curves, plan.center, plan.between) {
                 add_line(&mut csv, &named(line.to_owned()), &curve);
             }
         }
@@ -155,11 +192,38 @@ fn curves(rows: &[&CurveRow], group: &Group, axes: Axes) -> Result<Vec<(u64, Cur
     Ok(curves.collect())
 }
 
+/// Each task, or each task in each setting where lines of several methods in several settings
+/// would lie over each other.
+fn panels(rows: &[CurveRow]) -> Vec<Shown> {
+    let is_split = has_panels_of_settings(rows);
+    let shown = rows.iter().map(|row| Shown {
+        task: row.task.clone(),
+        setting: is_split.then(|| row.setting.clone()),
+    });
+    in_order_of_appearance(shown)
+}
+
+/// Whether on any task two settings or more are there with two methods or more.
+fn has_panels_of_settings(rows: &[CurveRow]) -> bool {
+    let mut methods: BTreeMap<(&str, &str), BTreeSet<&str>> = BTreeMap::new();
+    for row in rows {
+        let of_setting = methods.entry((&row.task, &row.setting)).or_default();
+        of_setting.insert(&row.method);
+    }
+    let with_several = |task: &str| {
+        let of_task = methods.iter().filter(|((of, _), _)| *of == task);
+        of_task.filter(|(_, methods)| methods.len() > 1).count()
+    };
+    methods.keys().any(|(task, _)| with_several(task) > 1)
+}
+
 /// Methods in the registry's order, others after them; settings in order of appearance.
 fn groups(rows: &[CurveRow]) -> Vec<Group> {
-    let all = rows
-        .iter()
-        .map(|row| (row.method.clone(), row.setting.clone()));
+    let is_split = has_panels_of_settings(rows);
+    let all = rows.iter().map(|row| {
+        let setting = (!is_split).then(|| row.setting.clone());
+        (row.method.clone(), setting)
+    });
     let mut groups = in_order_of_appearance(all);
     let rank = |method: &str| METHODS.iter().position(|m| m.name == method);
     groups.sort_by_key(|(method, _)| rank(method).unwrap_or(METHODS.len()));
@@ -167,30 +231,30 @@ fn groups(rows: &[CurveRow]) -> Vec<Group> {
 }
 
 fn is_in(row: &CurveRow, (method, setting): &Group) -> bool {
-    row.method == *method && row.setting == *setting
+    row.method == *method
+        && setting
+            .as_ref()
+            .is_none_or(|setting| *setting == row.setting)
 }
 
 /// "STAIR, N = 500 (5 seeds)".
 fn key_name(group: &Group, rows: &[CurveRow]) -> String {
-    let mut seeds: BTreeMap<&str, Vec<u64>> = BTreeMap::new();
+    let mut seeds: BTreeMap<(&str, &str), BTreeSet<u64>> = BTreeMap::new();
     for row in rows.iter().filter(|row| is_in(row, group)) {
-        let of_task = seeds.entry(&row.task).or_default();
-        if !of_task.contains(&row.seed) {
-            of_task.push(row.seed);
-        }
+        let of_curve = seeds.entry((&row.task, &row.setting)).or_default();
+        of_curve.insert(row.seed);
     }
-    let least = seeds.values().map(Vec::len).min().unwrap_or(0);
-    let most = seeds.values().map(Vec::len).max().unwrap_or(0);
+    let least = seeds.values().map(BTreeSet::len).min().unwrap_or(0);
+    let most = seeds.values().map(BTreeSet::len).max().unwrap_or(0);
     let n_seeds = match (least, most) {
         (1, 1) => "1 seed".to_owned(),
         (least, most) if least == most => format!("{most} seeds"),
         (least, most) => format!("{least}–{most} seeds"),
     };
     let method = shown_method(&group.0);
-    if group.1.is_empty() {
-        format!("{method} ({n_seeds})")
-    } else {
-        format!("{method}, {} ({n_seeds})", group.1)
+    match group.1.as_deref().unwrap_or_default() {
+        "" => format!("{method} ({n_seeds})"),
+        setting => format!("{method}, {setting} ({n_seeds})"),
     }
 }
 
@@ -233,6 +297,40 @@ mod tests {
             "the registry's order"
         );
         assert_eq!(draw(text).unwrap(), svg, "the same bytes");
+    }
+
+    #[test]
+    fn several_methods_in_several_settings_have_a_panel_for_each_setting() {
+        let in_setting = |method: &str, setting: &str| {
+            let rows = row(method, 1, 0, 0.0) + &row(method, 1, 1_000, 0.5);
+            rows.replace("\"setting\":\"\"", &format!("\"setting\":\"{setting}\""))
+        };
+        let one = in_setting("stair", "40 answers")
+            + &in_setting("stair", "80 answers")
+            + &in_setting("pebble", "40 answers");
+        let svg = draw(one.clone()).unwrap();
+        assert!(svg.contains("STAIR, 80 answers (1 seed)") && svg.contains(">window-open<"));
+
+        let both = one + &in_setting("pebble", "80 answers");
+        let svg = draw(both.clone()).unwrap();
+        assert!(svg.contains("STAIR (1 seed)") && !svg.contains("STAIR, "));
+        for title in ["window-open, 40 answers", "window-open, 80 answers"] {
+            assert!(svg.contains(title), "{title}");
+        }
+        let sources = [Source {
+            name: "rows.jsonl".into(),
+            text: both,
+        }];
+        let request = Request {
+            sources: &sources,
+            ..Request::default()
+        };
+        let csv = points(&request).unwrap();
+        assert!(
+            csv.contains("window-open,pebble,80 answers,seed 1,1000,50\n"),
+            "{csv}"
+        );
+        assert_eq!(csv.matches("seed 1,0,0").count(), 4, "each point once");
     }
 
     #[test]

@@ -14,6 +14,16 @@ pub(super) const BAND: &str =
 /// Fewer seeds have no interval worth telling.
 pub(crate) const LEAST_FOR_INTERVAL: usize = 3;
 
+/// What stands between two places at which a seed was measured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Between {
+    /// A straight line: what is measured goes on in between.
+    #[default]
+    Line,
+    /// Nothing: a seed counts where it was measured and nowhere else.
+    Nothing,
+}
+
 /// Panels of seeds side by side, with one key for all.
 pub(super) struct SeedSheet<'a> {
     /// What each group is; the n-th looks like the n-th series.
@@ -26,6 +36,8 @@ pub(super) struct SeedSheet<'a> {
     pub(super) is_rate: bool,
     /// How several seeds become one line.
     pub(super) center: fn(&[f64]) -> f64,
+    /// What a seed counts for between two of its points.
+    pub(super) between: Between,
 }
 
 impl SeedSheet<'_> {
@@ -62,7 +74,7 @@ impl SeedSheet<'_> {
                 y: self.y,
             };
             panel.draw_axes(&mut svg, labels);
-            draw_seeds(&mut svg, &panel, curves, self.center);
+            draw_seeds(&mut svg, &panel, curves, self.center, self.between);
         }
         svg.finish(title)
     }
@@ -74,8 +86,10 @@ pub(super) fn draw_seeds(
     panel: &Panel,
     groups: &[Vec<Curve>],
     center: fn(&[f64]) -> f64,
+    between: Between,
 ) {
-    let lines: Vec<Line> = groups.iter().map(|seeds| Line::of(seeds, center)).collect();
+    let line = |seeds: &Vec<Curve>| Line::of(seeds, center, between);
+    let lines: Vec<Line> = groups.iter().map(line).collect();
     for (n, line) in lines.iter().enumerate() {
         panel.band(svg, &line.band, series(n).color);
     }
@@ -101,16 +115,25 @@ struct Line {
 }
 
 impl Line {
-    /// Where all seeds have been evaluated; straight lines between evaluations.
-    fn of(seeds: &[Curve], center: fn(&[f64]) -> f64) -> Self {
+    /// Where all seeds have been evaluated, or, with nothing between evaluations, where any has.
+    fn of(seeds: &[Curve], center: fn(&[f64]) -> f64, between: Between) -> Self {
         let mut line = Self {
             center: Vec::new(),
             band: Vec::new(),
         };
-        for x in common_grid(seeds) {
-            let values: Vec<f64> = seeds.iter().map(|seed| interpolate(seed, x)).collect();
+        let at = |seed: &Curve, x: f64| match between {
+            Between::Line => Some(interpolate(seed, x)),
+            Between::Nothing => seed.iter().find(|p| p.0 == x).map(|p| p.1),
+        };
+        let mut grid = places(seeds);
+        if between == Between::Line {
+            let (from, to) = common_range(seeds);
+            grid.retain(|x| (from..=to).contains(x));
+        }
+        for x in grid {
+            let values: Vec<f64> = seeds.iter().filter_map(|seed| at(seed, x)).collect();
             line.center.push((x, center(&values)));
-            if seeds.len() >= LEAST_FOR_INTERVAL {
+            if values.len() >= LEAST_FOR_INTERVAL {
                 let found = Bootstrap::default().center(&values, center);
                 line.band
                     .extend(found.map(|e| (x, e.interval.lo, e.interval.hi)));
@@ -120,16 +143,19 @@ impl Line {
     }
 }
 
-/// Every place at which some seed was evaluated, within the range of all.
-fn common_grid(seeds: &[Curve]) -> Vec<f64> {
+/// Every place at which some seed was evaluated.
+fn places(seeds: &[Curve]) -> Vec<f64> {
+    let mut places: Vec<f64> = seeds.iter().flatten().map(|p| p.0).collect();
+    places.sort_by(f64::total_cmp);
+    places.dedup();
+    places
+}
+
+/// From the last of the seeds' beginnings to the first of their ends.
+fn common_range(seeds: &[Curve]) -> (f64, f64) {
     let from = seeds.iter().filter_map(|s| s.first()).map(|p| p.0);
     let to = seeds.iter().filter_map(|s| s.last()).map(|p| p.0);
-    let (from, to) = (from.fold(f64::MIN, f64::max), to.fold(f64::MAX, f64::min));
-    let mut grid: Vec<f64> = seeds.iter().flatten().map(|p| p.0).collect();
-    grid.retain(|x| (from..=to).contains(x));
-    grid.sort_by(f64::total_cmp);
-    grid.dedup();
-    grid
+    (from.fold(f64::MIN, f64::max), to.fold(f64::MAX, f64::min))
 }
 
 /// The value of a curve at a place within its range.
@@ -148,8 +174,9 @@ fn interpolate(curve: &[(f64, f64)], x: f64) -> f64 {
 pub(super) fn drawn_lines(
     seeds: &[Curve],
     center: fn(&[f64]) -> f64,
+    between: Between,
 ) -> [(&'static str, Curve); 3] {
-    let line = Line::of(seeds, center);
+    let line = Line::of(seeds, center, between);
     let lo = line.band.iter().map(|&(x, lo, _)| (x, lo)).collect();
     let hi = line.band.iter().map(|&(x, _, hi)| (x, hi)).collect();
     [("centre", line.center), ("lo", lo), ("hi", hi)]
@@ -194,7 +221,7 @@ mod tests {
             vec![(0.0, 0.0), (10.0, 1.0), (20.0, 1.0)],
             vec![(5.0, 1.0), (15.0, 0.0)],
         ];
-        let line = Line::of(&seeds, mean);
+        let line = Line::of(&seeds, mean, Between::Line);
         assert_eq!(line.center, [(5.0, 0.75), (10.0, 0.75), (15.0, 0.5)]);
         assert!(
             line.band.is_empty(),
@@ -207,7 +234,7 @@ mod tests {
         let seeds: Vec<Curve> = (0..5)
             .map(|k| vec![(0.0, f64::from(k)), (1.0, 2.0)])
             .collect();
-        let line = Line::of(&seeds, mean);
+        let line = Line::of(&seeds, mean, Between::Line);
         let (_, lo, hi) = line.band[0];
         assert!((0.0..2.0).contains(&lo) && hi > 2.0 && hi <= 4.0);
         assert_eq!(line.band[1], (1.0, 2.0, 2.0));
@@ -216,6 +243,20 @@ mod tests {
     #[test]
     fn seeds_that_share_no_range_have_no_centre() {
         let seeds = [vec![(0.0, 1.0)], vec![(5.0, 1.0), (6.0, 1.0)], vec![]];
-        assert!(Line::of(&seeds[..2], mean).center.is_empty());
+        let line = Line::of(&seeds[..2], mean, Between::Line);
+        assert!(line.center.is_empty());
+    }
+
+    #[test]
+    fn with_nothing_in_between_a_seed_counts_where_it_was_measured_alone() {
+        let some = vec![(40.0, 0.2), (80.0, 1.0), (160.0, 0.4)];
+        let others = vec![(40.0, 0.4), (160.0, 0.6)];
+        let seeds = [some, others.clone(), others];
+        let line = Line::of(&seeds, mean, Between::Nothing);
+        let places: Vec<f64> = line.center.iter().map(|p| p.0).collect();
+        assert_eq!(places, [40.0, 80.0, 160.0]);
+        assert_eq!(line.center[1].1, 1.0, "of the one seed there");
+        let banded: Vec<f64> = line.band.iter().map(|p| p.0).collect();
+        assert_eq!(banded, [40.0, 160.0], "one seed has no interval");
     }
 }

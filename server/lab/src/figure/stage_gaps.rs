@@ -5,35 +5,84 @@ use std::collections::BTreeMap;
 
 use domain::agreement::interquartile_mean;
 
-use super::seeds::{Curve, SeedSheet, add_line, drawn_lines, in_order_of_appearance, quoted};
-use super::{FigureEntry, FigureError, Request, read_rows, shown_method};
+use super::seeds::{
+    Between, Curve, SeedSheet, add_line, drawn_lines, in_order_of_appearance, quoted,
+};
+use super::{FigureEntry, FigureError, Request, find, read_rows, shown_method};
+use crate::config::RunConfig;
 use crate::experiment::results::{Content, Row};
+use crate::method;
+
+const INPUT: &str = "the results of an experiment, from methods that have a stage gap";
 
 pub(super) const ENTRY: FigureEntry = FigureEntry {
     name: "stage-gaps",
     summary: "stage gap of chosen pairs against all candidates, over environment steps",
-    input: "the results of an experiment, from methods that have a stage gap",
+    input: INPUT,
     choices: &[],
-    make,
+    make: |request| GAPS.draw(request),
 };
 
-/// Method and setting, and whether it is of the chosen pairs.
-type Group = (String, String, bool);
+pub(super) const RATIOS_ENTRY: FigureEntry = FigureEntry {
+    name: "stage-gap-ratios",
+    summary: "stage gap of chosen pairs by that of all candidates, over environment steps",
+    input: INPUT,
+    choices: &[],
+    make: |request| RATIOS.draw(request),
+};
+
+/// The gaps themselves.
+pub(crate) const GAPS: StageGaps = StageGaps {
+    figure: "stage-gaps",
+    lines: |chosen, pool| vec![("chosen", chosen), ("candidates", pool)],
+    has_unit: true,
+    y: "Stage gap",
+    title: "Stage gap of chosen pairs and of all candidates over environment steps",
+};
+
+/// What choosing does to them: below 1 the chosen pairs lie closer than candidates do.
+pub(crate) const RATIOS: StageGaps = StageGaps {
+    figure: "stage-gap-ratios",
+    lines: |chosen, pool| {
+        let ratio = (pool > 0.0).then_some(("", chosen / pool));
+        ratio.into_iter().collect()
+    },
+    has_unit: false,
+    y: "Stage gap, chosen / candidates",
+    title: "Stage gap of chosen pairs by that of all candidates over environment steps",
+};
+
+/// A figure of stage gaps over environment steps.
+pub(crate) struct StageGaps {
+    figure: &'static str,
+    /// Lines and their heights, of the gaps of chosen pairs and of candidates in a session.
+    lines: fn(f64, f64) -> Vec<(&'static str, f64)>,
+    /// Whether nats and shares need panels of their own.
+    has_unit: bool,
+    y: &'static str,
+    title: &'static str,
+}
+
+/// Method, setting, and which of its lines.
+type Group = (String, String, &'static str);
 
 /// The curve of each seed of a group.
 type Seeds = Vec<(u64, Curve)>;
 
-/// Curves of each group by task.
+/// Task, and the unit where it needs to be told.
+type Place = (String, &'static str);
+
+/// Curves of each group by place.
 struct Plan {
     groups: Vec<Group>,
-    tasks: Vec<(String, Vec<Seeds>)>,
+    panels: Vec<(Place, Vec<Seeds>)>,
 }
 
-impl Plan {
-    fn of(request: &Request) -> Result<Self, FigureError> {
-        let rows: Vec<Row> = read_rows(&ENTRY, request.sources)?;
-        let mut points: BTreeMap<(String, Group), BTreeMap<u64, Curve>> = BTreeMap::new();
-        let (mut tasks, mut groups) = (Vec::new(), Vec::new());
+impl StageGaps {
+    fn plan(&self, request: &Request) -> Result<Plan, FigureError> {
+        let rows: Vec<Row> = read_rows(find(self.figure)?, request.sources)?;
+        let mut points: BTreeMap<(Place, Group), BTreeMap<u64, Curve>> = BTreeMap::new();
+        let (mut places, mut groups) = (Vec::new(), Vec::new());
         for Row { key, content } in rows {
             let Content::Session(session) = content else {
                 continue;
@@ -45,84 +94,97 @@ impl Plan {
             if session.session == 0 {
                 continue; // random, before anything is known of stages
             }
-            let setting = key.shown_setting();
-            for (is_chosen, gap) in [(true, chosen), (false, pool)] {
-                let group = (key.method.clone(), setting.clone(), is_chosen);
+            let unit = if self.has_unit { unit(&key.method) } else { "" };
+            let place = (key.task.clone(), unit);
+            for (line, height) in (self.lines)(chosen, pool) {
+                let group = (key.method.clone(), key.shown_setting(), line);
                 groups.push(group.clone());
-                let curves = points.entry((key.task.clone(), group)).or_default();
+                let curves = points.entry((place.clone(), group)).or_default();
                 let curve = curves.entry(key.seed).or_default();
-                curve.push((session.step as f64, gap));
+                curve.push((session.step as f64, height));
             }
-            tasks.push(key.task);
+            places.push(place);
         }
         let groups = in_order_of_appearance(groups);
-        let tasks = in_order_of_appearance(tasks).into_iter().map(|task| {
+        let panels = in_order_of_appearance(places).into_iter().map(|place| {
             let curves = groups.iter().map(|group| {
-                let seeds = points
-                    .remove(&(task.clone(), group.clone()))
-                    .unwrap_or_default();
-                seeds.into_iter().collect()
+                let seeds = points.remove(&(place.clone(), group.clone()));
+                seeds.unwrap_or_default().into_iter().collect()
             });
             let curves = curves.collect();
-            (task, curves)
+            (place, curves)
         });
-        let tasks: Vec<_> = tasks.collect();
-        if tasks.is_empty() {
+        let panels: Vec<_> = panels.collect();
+        if groups.is_empty() {
             return Err(FigureError::NoRows {
-                figure: ENTRY.name,
-                input: ENTRY.input,
+                figure: self.figure,
+                input: INPUT,
             });
         }
-        Ok(Self { groups, tasks })
+        Ok(Plan { groups, panels })
     }
-}
 
-fn make(request: &Request) -> Result<String, FigureError> {
-    let plan = Plan::of(request)?;
-    let name = |(method, setting, is_chosen): &Group| {
-        let what = if *is_chosen { "chosen" } else { "candidates" };
-        let parts = [&shown_method(method), setting.as_str(), what];
-        let parts: Vec<&str> = parts.into_iter().filter(|part| !part.is_empty()).collect();
-        parts.join(", ")
-    };
-    let sheet = SeedSheet {
-        groups: plan.groups.iter().map(name).collect(),
-        x: "Environment steps",
-        y: "Stage gap (temporal distance: nats)",
-        is_rate: false,
-        center: interquartile_mean,
-    };
-    let panel = |(task, groups): &(String, Vec<Seeds>)| {
-        let alone = |seeds: &Seeds| seeds.iter().map(|(_, curve)| curve.clone()).collect();
-        (task.clone(), groups.iter().map(alone).collect::<Vec<_>>())
-    };
-    let panels: Vec<_> = plan.tasks.iter().map(panel).collect();
-    Ok(sheet.draw(
-        &panels,
-        "Stage gap of chosen pairs and of all candidates over environment steps",
-    ))
-}
+    /// # Errors
+    /// Without rows of stage gaps.
+    pub(crate) fn draw(&self, request: &Request) -> Result<String, FigureError> {
+        let plan = self.plan(request)?;
+        let name = |(method, setting, line): &Group| {
+            let parts = [&shown_method(method), setting.as_str(), line];
+            let parts: Vec<&str> = parts.into_iter().filter(|part| !part.is_empty()).collect();
+            parts.join(", ")
+        };
+        let sheet = SeedSheet {
+            groups: plan.groups.iter().map(name).collect(),
+            x: "Environment steps",
+            y: self.y,
+            is_rate: false,
+            center: interquartile_mean,
+            between: Between::Line,
+        };
+        let panel = |((task, unit), groups): &(Place, Vec<Seeds>)| {
+            let alone = |seeds: &Seeds| seeds.iter().map(|(_, curve)| curve.clone()).collect();
+            let title = if unit.is_empty() {
+                task.clone()
+            } else {
+                format!("{task} ({unit})")
+            };
+            (title, groups.iter().map(alone).collect::<Vec<_>>())
+        };
+        let panels: Vec<_> = plan.panels.iter().map(panel).collect();
+        Ok(sheet.draw(&panels, self.title))
+    }
 
-/// Every point of the figure as CSV.
-///
-/// # Errors
-/// As for drawing it.
-pub fn points(request: &Request) -> Result<String, FigureError> {
-    let plan = Plan::of(request)?;
-    let mut csv = String::from("task,method,setting,pairs,line,x,y\n");
-    for (task, groups) in &plan.tasks {
-        for ((method, setting, is_chosen), seeds) in plan.groups.iter().zip(groups) {
-            let pairs = if *is_chosen { "chosen" } else { "candidates" };
-            let named =
-                |line: String| format!("{task},{method},{},{pairs},{line}", quoted(setting));
-            for (seed, curve) in seeds {
-                add_line(&mut csv, &named(format!("seed {seed}")), curve);
-            }
-            let curves: Vec<Curve> = seeds.iter().map(|(_, curve)| curve.clone()).collect();
-            for (line, curve) in drawn_lines(&curves, interquartile_mean) {
-                add_line(&mut csv, &named(line.to_owned()), &curve);
+    /// Every point of the figure as CSV.
+    ///
+    /// # Errors
+    /// As for drawing it.
+    pub(crate) fn points(&self, request: &Request) -> Result<String, FigureError> {
+        let plan = self.plan(request)?;
+        let mut csv = String::from("task,method,setting,pairs,line,x,y\n");
+        for ((task, _), groups) in &plan.panels {
+            for ((method, setting, pairs), seeds) in plan.groups.iter().zip(groups) {
+                let named =
+                    |line: String| format!("{task},{method},{},{pairs},{line}", quoted(setting));
+                for (seed, curve) in seeds {
+                    add_line(&mut csv, &named(format!("seed {seed}")), curve);
+                }
+                let curves: Vec<Curve> = seeds.iter().map(|(_, curve)| curve.clone()).collect();
+                for (line, curve) in drawn_lines(&curves, interquartile_mean, Between::Line) {
+                    add_line(&mut csv, &named(line.to_owned()), &curve);
+                }
             }
         }
+        Ok(csv)
     }
-    Ok(csv)
+}
+
+/// In what a method's gaps are told.
+fn unit(method: &str) -> &'static str {
+    let recipe = method::find(method).map(|entry| (entry.build)(&RunConfig::default()));
+    let stage = recipe.ok().and_then(|recipe| recipe.stage);
+    if stage.is_some_and(|stage| stage.is_of_intervals()) {
+        "share of an interval"
+    } else {
+        "nats" // the quadrilaterals, also as any method's sampler brings them along
+    }
 }

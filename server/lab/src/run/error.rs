@@ -57,6 +57,12 @@ pub enum RunError {
         /// Where.
         folder: PathBuf,
     },
+    /// No run where one should be.
+    #[error("{folder} holds no run: there is no config.toml in it")]
+    NoRun {
+        /// Where.
+        folder: PathBuf,
+    },
     /// None of the checkpoints can be read.
     #[error("no checkpoint in {folder} can be used: {reasons}")]
     NoCheckpoint {

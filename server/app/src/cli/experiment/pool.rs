@@ -2,8 +2,8 @@
 //!
 //! Processes and not threads: what takes a process down (memory, a fault inside libtorch) then
 //! takes one run, its memory goes back to the system when it ends, and a run is stopped and taken
-//! up again exactly as `stair train` is. A run computes on one thread, with a second for what can
-//! go on beside it, so as many runs as cores keep the machine busy.
+//! up again exactly as `stair train` is. Each has its share of the processors, which changes
+//! nothing of what it computes.
 //!
 //! A run's process has its stdin open to this one and stops with a checkpoint when that ends,
 //! however this one ends.
@@ -20,14 +20,16 @@ use std::time::{Duration, Instant};
 use anyhow::Context as _;
 use indicatif::{ProgressBar, ProgressStyle};
 use lab::experiment::grid::GridRun;
-use lab::experiment::results::{GridFolder, Results, rows_of_run};
+use lab::experiment::results::{GridFolder, Results, Row, rows_of_run};
 use lab::history::RunHistory;
 use lab::run::Run;
 use serde_json::json;
 
 use super::{check, in_words};
-use crate::cli::provenance::REVISION;
+use crate::provenance::{REVISION, processors};
 
+/// How many threads a process computes on; whoever sets it knows better.
+const N_THREADS: &str = "RAYON_NUM_THREADS";
 /// Between looks at the processes.
 const LOOK: Duration = Duration::from_millis(100);
 /// Between looks at how far they are.
@@ -126,6 +128,10 @@ impl<'a> Pool<'a> {
         std::fs::create_dir_all(&path).context("cannot make the run's folder")?;
         let program = std::env::current_exe().context("cannot find this program")?;
         let mut command = Command::new(program);
+        if std::env::var_os(N_THREADS).is_none() {
+            let share = (processors().get() / self.jobs).max(1);
+            command.env(N_THREADS, share.to_string());
+        }
         command.args([
             "train",
             "--json",
@@ -167,23 +173,21 @@ impl<'a> Pool<'a> {
         let (run, key) = (worker.run, &worker.run.key);
         let path = self.folder.run_path(key);
         match end(&path, status) {
-            End::Finished => {
-                let metrics = std::fs::read_to_string(path.join("metrics.jsonl"))
-                    .with_context(|| format!("cannot read the metrics of {}", key.name()))?;
-                match rows_of_run(key, &run.config, &metrics, &RunHistory::of(&path))? {
-                    Some(rows) => {
-                        self.folder.add(&rows)?;
-                        self.folder.slim(key)?;
-                        tally.n_finished += 1;
-                        progress.say(&format!("finished {}", key.name()));
+            End::Finished => match finished_rows(run, &path) {
+                Ok(rows) => {
+                    self.folder.add(&rows)?;
+                    tally.n_finished += 1;
+                    progress.say(&format!("finished {}", key.name()));
+                    if let Err(error) = self.folder.slim(key) {
+                        progress.say(&error.to_string());
                     }
-                    None => self.fail(
-                        run,
-                        "it ended without a last line in its metrics".into(),
-                        tally,
-                    )?,
                 }
-            }
+                Err(error) => {
+                    let reason = format!("{error:#}");
+                    progress.say(&format!("failed {}: {reason}", key.name()));
+                    self.fail(run, reason, tally)?;
+                }
+            },
             End::Stopped => progress.say(&format!("stopped {}", key.name())),
             End::Failed(reason) => {
                 progress.say(&format!("failed {}: {reason}", key.name()));
@@ -198,6 +202,14 @@ impl<'a> Pool<'a> {
         tally.failed.push((run.key.name(), reason));
         Ok(())
     }
+}
+
+/// The rows of a run that ended well, from its folder.
+fn finished_rows(run: &GridRun, path: &Path) -> anyhow::Result<Vec<Row>> {
+    let metrics = path.join("metrics.jsonl");
+    let metrics = std::fs::read_to_string(metrics).context("cannot read its metrics")?;
+    let rows = rows_of_run(&run.key, &run.config, &metrics, &RunHistory::of(path)?)?;
+    rows.context("it ended without a last line in its metrics")
 }
 
 /// Whether a run finished, was stopped, or failed, and why.
@@ -215,7 +227,9 @@ fn end(path: &Path, status: ExitStatus) -> End {
         return End::Failed(format!("its process was ended by signal {signal}{hint}"));
     }
     let said = std::fs::read_to_string(path.join("log.txt")).unwrap_or_default();
-    let last = said.lines().rev().find(|line| !line.trim().is_empty());
+    // A panic's own words stand before a hint on how to see more of it.
+    let says = |line: &&str| !line.trim().is_empty() && !line.starts_with("note: run with");
+    let last = said.lines().rev().find(says);
     let last = last.map(|line| line.trim_start_matches("stair: "));
     End::Failed(last.map_or_else(|| format!("it ended with {status}"), str::to_owned))
 }
@@ -366,6 +380,11 @@ mod tests {
             panic!("code 1 is a failure")
         };
         assert_eq!(reason, "no card");
+        let panic = "thread 'main' panicked at x.rs:1:\nno such tensor\nnote: run with `RUST_BACKTRACE=1`\n";
+        let End::Failed(reason) = ended(0x6500, panic, "") else {
+            panic!("code 101 is a failure")
+        };
+        assert_eq!(reason, "no such tensor");
         let End::Failed(reason) = ended(9, "", "") else {
             panic!("a signal is a failure")
         };

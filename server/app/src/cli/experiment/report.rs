@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use lab::experiment::grid::{GridText, setting_names};
 use lab::experiment::report::{self, RowFile};
 
 use super::write_with_picture;
@@ -56,5 +57,19 @@ fn read(path: &Path) -> Result<RowFile, BadInput> {
     let name = path.display().to_string();
     let text = std::fs::read_to_string(&path)
         .map_err(|error| BadInput(format!("cannot read {name}: {error}")))?;
-    Ok(RowFile { name, text })
+    let grid = path.with_file_name("experiment.toml"); // rows alone will do
+    let settings = std::fs::read_to_string(&grid).map_or_else(
+        |_| Vec::new(),
+        |text| {
+            setting_names(GridText {
+                name: &grid.display().to_string(),
+                text: &text,
+            })
+        },
+    );
+    Ok(RowFile {
+        name,
+        text,
+        settings,
+    })
 }

@@ -11,11 +11,11 @@ use anyhow::Context as _;
 use lab::experiment::results::GridFolder;
 use learn::device::Device;
 
+use super::Chosen;
 use super::pool::{Pool, Tally};
-use super::{Chosen, processors};
 use crate::cli::BadInput;
 use crate::cli::interrupt::on_interrupt;
-use crate::cli::provenance::REVISION;
+use crate::provenance::{REVISION, processors};
 
 /// How long to wait for runs of an earlier start to leave their checkpoints.
 const PATIENCE: Duration = Duration::from_mins(1);
@@ -60,19 +60,19 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let out = args.out.clone().unwrap_or_else(named);
     let folder = GridFolder::at(&out);
     let revision = (!args.mixed).then_some(REVISION);
+    folder.create()?;
+    let log = folder.log_file()?;
+    hold(&log, &out)?;
     let results = folder.results().map_err(BadInput::from_error)?;
     folder
         .check(&chosen.grid.runs, &results, revision)
         .map_err(BadInput::from_error)?;
-    folder.create(&chosen.text)?;
-    let log = folder.log_file()?;
-    hold(&log, &out)?;
+    folder.keep_file(&chosen.text)?;
 
     let is_told = Arc::new(AtomicBool::new(false));
     let hears = Arc::clone(&is_told);
     on_interrupt(move || hears.store(true, Ordering::SeqCst))?;
     let jobs = args.jobs.unwrap_or_else(processors).get();
-    let results = folder.results().map_err(BadInput::from_error)?; // another start may have added some
     let pool = Pool::new(&folder, log, jobs);
     let tally = pool.work(&chosen.grid.runs, &results, &is_told)?;
     Ok(tell(&tally, &out))

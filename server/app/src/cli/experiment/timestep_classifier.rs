@@ -10,8 +10,9 @@ use lab::experiment::timestep_classifier::{
 };
 use learn::timestep::TimestepConfig;
 
-use super::{processors, write_with_picture};
+use super::write_with_picture;
 use crate::cli::BadInput;
+use crate::provenance::processors;
 
 /// Tell from a scripted expert's states at which step they were seen: the paper's evidence that
 /// tasks have stages

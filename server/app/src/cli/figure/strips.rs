@@ -12,6 +12,7 @@ use render::{Renderer, RgbaImage, evenly};
 
 use crate::cli::BadInput;
 use crate::cli::render::png;
+use crate::provenance::REVISION;
 
 /// Pictures of a segment, from its first to its last state.
 const N_SHOTS: usize = 6;
@@ -28,7 +29,7 @@ pub(super) fn sources(paths: &[impl AsRef<Path>], top: usize) -> anyhow::Result<
     let mut sources = Vec::new();
     for path in paths.iter().map(AsRef::as_ref) {
         let packed = if path.is_dir() {
-            PackedQueries::of_run(path, None, env!("STAIR_REVISION"))
+            PackedQueries::of_run(path, None, REVISION)
         } else if path.extension().is_some_and(|ending| ending == "queries") {
             PackedQueries::read(path)
         } else {

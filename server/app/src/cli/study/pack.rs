@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use lab::study::{DEFAULT_QUERIES, PackedQueries};
 
 use crate::cli::{BadInput, figure, say};
+use crate::provenance::REVISION;
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
@@ -36,7 +37,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         let told = format!("{} must end in .queries", args.out.display());
         return Err(BadInput(told).into());
     }
-    let packed = PackedQueries::of_run(&args.folder, Some(args.n), env!("STAIR_REVISION"))
+    let packed = PackedQueries::of_run(&args.folder, Some(args.n), REVISION)
         .map_err(BadInput::from_error)?;
     let bytes = packed.pack();
     figure::write(&args.out, &bytes)?;

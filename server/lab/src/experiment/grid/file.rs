@@ -79,6 +79,13 @@ pub(super) enum Seeds {
 }
 
 impl Seeds {
+    pub(super) fn n(&self) -> usize {
+        match self {
+            Self::Count(n) => *n as usize,
+            Self::List(seeds) => seeds.len(),
+        }
+    }
+
     pub(super) fn list(&self) -> Vec<u64> {
         match self {
             Self::Count(n) => (1..=u64::from(*n)).collect(),

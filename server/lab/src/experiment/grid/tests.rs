@@ -166,7 +166,7 @@ fn settings_with_one_name_and_far_too_many_runs_are_refused() {
         told_alike.contains("'40 labels' and '40-labels' would share"),
         "{told_alike}"
     );
-    let told_many = told(&SMALL_TASK.replacen("seeds = 2", "seeds = 4000000", 1));
+    let told_many = told(&SMALL_TASK.replacen("seeds = 2", "seeds = 4000000000", 1));
     assert!(told_many.contains("more than"), "{told_many}");
 }
 

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::ReportError;
-use crate::experiment::results::{Results, RunResult};
+use crate::experiment::results::{Results, RunResult, first_difference};
 
 /// Refuses what must not be compared.
 pub(super) fn check(files: &[(&str, Results)], may_mix: bool) -> Result<(), ReportError> {
@@ -15,7 +15,15 @@ pub(super) fn check(files: &[(&str, Results)], may_mix: bool) -> Result<(), Repo
             .join(", ")
     };
     if files.iter().all(|(_, results)| results.runs.is_empty()) {
-        return Err(ReportError::Nothing(names()));
+        let mut failed = files.iter().flat_map(|(_, results)| &results.failed);
+        let failed = failed.next().map_or_else(String::new, |(run, reason)| {
+            let n = 1 + failed.count();
+            format!("; {n} failed, the first, {}: {reason}", run.name())
+        });
+        return Err(ReportError::Nothing {
+            files: names(),
+            failed,
+        });
     }
     tasks(files)?;
     once(files)?;
@@ -110,11 +118,11 @@ fn terms(first: &RunResult, second: &RunResult) -> Result<(), ReportError> {
     if (&a.task, &a.setting) != (&b.task, &b.setting) {
         return Ok(());
     }
-    let differ = |what, there: &dyn ToString, here: &dyn ToString| {
+    let differ = |what: &str, there: &dyn ToString, here: &dyn ToString| {
         Err(ReportError::OtherTerms {
             first: a.name(),
             second: b.name(),
-            what,
+            what: what.to_owned(),
             there: there.to_string(),
             here: here.to_string(),
         })
@@ -143,7 +151,12 @@ fn terms(first: &RunResult, second: &RunResult) -> Result<(), ReportError> {
     }
     let is_of_one_group = (&a.method, &a.teacher) == (&b.method, &b.teacher);
     if is_of_one_group && x.settings != y.settings {
-        return differ("settings", &x.settings, &y.settings);
+        let (Some(there), Some(here)) = (first.config()?, second.config()?) else {
+            return differ("settings", &x.settings, &y.settings);
+        };
+        if let Some((key, there, here)) = first_difference(&there, &here) {
+            return differ(&key, &there, &here);
+        }
     }
     Ok(())
 }

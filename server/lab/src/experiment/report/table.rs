@@ -8,10 +8,14 @@ use super::{Group, RunResult, Runs};
 use crate::figure::LEAST_FOR_INTERVAL;
 use crate::method::METHODS;
 
+/// Pairs of seeds from which on a difference may be called one. With fewer, differences of pure
+/// chance have one sign in more than one case of twenty (2 · ½ⁿ), and an interval drawn from
+/// them leaves 0 out then.
+const LEAST_TO_BE_SURE: usize = 6;
 /// Shares of success of which the tables say when they were reached.
 const SHARES: [f64; 3] = [0.5, 0.8, 0.95];
 
-/// The groups of a report: tasks in order of appearance, in each the settings in theirs, in each
+/// The groups of a report: tasks in order of their runs, in each the settings in theirs, in each
 /// the methods in the registry's order.
 fn groups(runs: &Runs) -> Vec<Group> {
     let (mut tasks, mut settings, mut groups) = (Vec::new(), Vec::new(), Vec::new());
@@ -131,8 +135,8 @@ fn told(when: &[Option<Reached>]) -> String {
     format!("{} ({}){n}", middle.labels, middle.step)
 }
 
-/// The first method against every other in the same setting; where there is one method alone,
-/// the first setting against every other.
+/// The first method against every other in the same setting, and every method's first setting
+/// against its others.
 fn differences(text: &mut String, runs: &Runs, groups: &[&Group]) {
     let mut lines = String::new();
     for (first, second) in pairs(groups) {
@@ -172,7 +176,7 @@ fn differences(text: &mut String, runs: &Runs, groups: &[&Group]) {
     }
     if !lines.is_empty() {
         text.push_str(
-            "\nDifferences between runs of the same seed, mean with its 95 % bootstrap interval; bold where it excludes 0:\n\n\
+            "\nDifferences between runs of the same seed, mean with its 95 % bootstrap interval; bold where it excludes 0 and there are six seeds or more, as fewer agree by chance too often:\n\n\
              | difference | seeds | of scores | of areas | of pairs in one true stage |\n|---|---:|---|---|---|\n",
         );
         text.push_str(&lines);
@@ -180,25 +184,20 @@ fn differences(text: &mut String, runs: &Runs, groups: &[&Group]) {
 }
 
 fn pairs<'a>(groups: &[&'a Group]) -> Vec<(&'a Group, &'a Group)> {
-    let is_one_method = groups.iter().all(|group| group.method == groups[0].method);
-    if is_one_method {
-        return groups
-            .iter()
-            .skip(1)
-            .map(|other| (groups[0], *other))
-            .collect();
-    }
+    // In a setting its first method against every other, then of a method its first setting
+    // against every other.
+    let of_setting = |a: &Group, b: &Group| a.setting == b.setting;
+    let of_method = |a: &Group, b: &Group| a.method == b.method;
     let mut pairs = Vec::new();
-    for (n, group) in groups.iter().enumerate() {
-        // Methods of a setting stand together, the first one first.
-        let first = groups
-            .iter()
-            .position(|other| other.setting == group.setting);
-        pairs.extend(
-            first
-                .filter(|first| *first < n)
-                .map(|first| (groups[first], *group)),
-        );
+    for are_alike in [of_setting, of_method] {
+        for (n, group) in groups.iter().enumerate() {
+            let first = groups.iter().position(|other| are_alike(other, group));
+            pairs.extend(
+                first
+                    .filter(|first| *first < n)
+                    .map(|first| (groups[first], *group)),
+            );
+        }
     }
     pairs
 }
@@ -208,7 +207,7 @@ fn difference(pairs: &[(f64, f64)], is_rate: bool) -> String {
         || "–".into(),
         |found| {
             let told = told_of(pairs.len(), &found, is_rate);
-            let is_sure = pairs.len() >= LEAST_FOR_INTERVAL && !found.interval.contains(0.0);
+            let is_sure = pairs.len() >= LEAST_TO_BE_SURE && !found.interval.contains(0.0);
             if is_sure { format!("**{told}**") } else { told }
         },
     )

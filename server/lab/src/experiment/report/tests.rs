@@ -1,4 +1,5 @@
 use super::*;
+use crate::config::RunConfig;
 use crate::experiment::results::{Content, Row, RunRow};
 use crate::message::{Evaluation, SessionOffered};
 
@@ -44,6 +45,7 @@ impl Told {
             has_success: true,
             weights: "ab".into(),
             settings: format!("{}-{}", self.method, self.budget),
+            config: toml::Table::new(),
             revision: "abc".into(),
             machine: "two cores".into(),
             wall_s: 60.0,
@@ -110,6 +112,7 @@ fn file(name: &str, text: String) -> RowFile {
     RowFile {
         name: name.into(),
         text,
+        settings: Vec::new(),
     }
 }
 
@@ -263,7 +266,9 @@ fn the_report_has_tables_curves_and_points_the_same_each_time() {
             "success.svg",
             "success.csv",
             "stage-gaps.svg",
-            "stage-gaps.csv"
+            "stage-gaps.csv",
+            "stage-gap-ratios.svg",
+            "stage-gap-ratios.csv"
         ]
     );
     assert_eq!(make(&files, false).unwrap(), artifacts);
@@ -272,8 +277,8 @@ fn the_report_has_tables_curves_and_points_the_same_each_time() {
         "| stair | – | 3 | 0.50 [0.50, 0.50] (last 3) | 0.50, 0.50, 0.50 | 0.50 [0.50, 0.50] | 20 (2000) | 30 (3000) | 30 (3000) |",
         "| 0.25, 0.17, 0.17 |",
         // scores differ by 0.25, 0.33, 0.33: their mean, from the lowest to the highest seed
-        "| stair − pebble | 3 | **0.31 [0.25, 0.33]** |",
-        "**0.50 [0.50, 0.50]** |",
+        "| stair − pebble | 3 | 0.31 [0.25, 0.33] |",
+        "0.50 [0.50, 0.50] |",
         "| stair | – | 0.75 [0.75, 0.75] | 0.25 [0.25, 0.25] |",
         "never",
     ] {
@@ -306,6 +311,116 @@ fn several_budgets_of_a_method_make_a_figure_of_their_own() {
         artifacts[0]
             .text
             .contains("stair (40 answers) − stair (80 answers)")
+    );
+}
+
+/// Settings as their file names them, whichever run came to its end first.
+#[test]
+fn the_order_of_a_report_is_not_that_in_which_runs_ended() {
+    let in_setting = |setting| Told { setting, ..STAIR }.text();
+    let text = |settings: [&'static str; 2]| settings.map(in_setting).concat();
+    let report = |text: String| {
+        let settings = vec!["every step".to_owned(), "every 10".to_owned()];
+        let file = RowFile {
+            settings,
+            ..file("rows.jsonl", text)
+        };
+        make(&[file], false).unwrap()
+    };
+    let first = report(text(["every 10", "every step"]));
+    assert_eq!(first, report(text(["every step", "every 10"])));
+    assert!(
+        first[0]
+            .text
+            .contains("stair (every step) − stair (every 10)")
+    );
+}
+
+#[test]
+fn differences_are_between_methods_in_a_setting_and_between_settings_of_a_method() {
+    let told = |method, setting| {
+        Told {
+            method,
+            setting,
+            ..STAIR
+        }
+        .text()
+    };
+    let text =
+        told("stair", "unchanged") + &told("pebble", "unchanged") + &told("stair", "gap alone");
+    let file = RowFile {
+        settings: vec!["unchanged".into(), "gap alone".into()],
+        ..file("rows.jsonl", text)
+    };
+    let report = &make(&[file], false).unwrap()[0].text;
+    for difference in [
+        "stair (unchanged) − pebble (unchanged)",
+        "stair (unchanged) − stair (gap alone)",
+    ] {
+        assert!(
+            report.contains(difference),
+            "{difference} is not in:\n{report}"
+        );
+    }
+    assert!(!report.contains("− pebble (gap alone)"));
+}
+
+#[test]
+fn settings_that_differ_are_told_by_name_and_those_that_came_later_are_as_by_default() {
+    let with = |seed, budget, change: &dyn Fn(&mut toml::Table)| {
+        let told = Told { seed, ..STAIR };
+        let mut config: toml::Table = toml::from_str(&RunConfig::default().to_toml()).unwrap();
+        change(&mut config);
+        told.rows(RunRow {
+            settings: format!("of seed {seed}"),
+            budget,
+            config,
+            ..told.end()
+        })
+    };
+    let agent = |config: &mut toml::Table, key: &str, value: Option<i64>| {
+        let agent = config["agent"].as_table_mut().unwrap();
+        match value {
+            None => agent.remove(key),
+            Some(value) => agent.insert(key.into(), value.into()),
+        };
+    };
+    let as_is = with(1, 80, &|_| {});
+    let older = with(2, 80, &|config| agent(config, "layer_norm", None));
+    make(&[file("a", as_is.clone() + &older)], false).unwrap();
+    let other = with(2, 80, &|config| agent(config, "batch", Some(77)));
+    let error = make(&[file("a", as_is + &other)], false).unwrap_err();
+    let told = error.to_string();
+    assert!(
+        told.contains("agent.batch") && told.contains("77"),
+        "{told}"
+    );
+}
+
+#[test]
+fn three_seeds_alike_are_not_called_a_difference() {
+    let report = &make(&[file("rows.jsonl", three_seeds_each())], false).unwrap()[0].text;
+    assert!(
+        report.contains("| stair − pebble | 3 | 0.31 [0.25, 0.33] |"),
+        "{report}"
+    );
+    let mut six = String::new();
+    for seed in 1..=6 {
+        six += &Told { seed, ..STAIR }.text();
+        let method = "pebble";
+        let success = &[0.0, 0.0, 0.5];
+        six += &Told {
+            seed,
+            method,
+            success,
+            ..STAIR
+        }
+        .text();
+    }
+    let report = &make(&[file("rows.jsonl", six)], false).unwrap()[0].text;
+    assert!(
+        report.contains("| stair − pebble | 6 | **0.33 [0.33, 0.33]** |"),
+        "{report}"
     );
 }
 

@@ -13,9 +13,11 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
-use super::{Content, Results, Row, fingerprint, without_seed};
+use super::settings::{first_difference, without_seed};
+use super::{Content, Results, Row, fingerprint};
 use crate::config::{ConfigError, RunConfig};
 use crate::experiment::grid::{GridRun, RunKey};
+use crate::history::RunHistory;
 
 /// Why a grid's folder cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -55,9 +57,9 @@ pub enum Misfit {
         /// Its value in the file.
         here: String,
     },
-    /// Rows that another version of the program made.
+    /// Runs that another version of the program made or began.
     #[error(
-        "{n} finished runs are of revision {there}, this program is {here} (the first: {run}); their numbers may differ for that alone. Choose another --out, or allow it with --mixed"
+        "{n} runs there are of revision {there}, this program is {here} (the first: {run}); their numbers may differ for that alone. Choose another --out, or allow it with --mixed"
     )]
     OtherRevision {
         /// How many.
@@ -85,15 +87,23 @@ impl GridFolder {
         }
     }
 
-    /// Makes it, and keeps the file that it belongs to.
+    /// Makes it, where it does not exist.
     ///
     /// # Errors
     /// When the disk refuses.
-    pub fn create(&self, text: &str) -> Result<(), StoreError> {
+    pub fn create(&self) -> Result<(), StoreError> {
         for folder in ["runs", "settings"] {
             let path = self.root.join(folder);
             fs::create_dir_all(&path).map_err(refused("make the experiment's folder", &path))?;
         }
+        Ok(())
+    }
+
+    /// Keeps the file that it belongs to.
+    ///
+    /// # Errors
+    /// When the disk refuses.
+    pub fn keep_file(&self, text: &str) -> Result<(), StoreError> {
         self.replace("experiment.toml", text)
     }
 
@@ -124,10 +134,15 @@ impl GridFolder {
     /// A file that cannot be read, a line that is no row.
     pub fn results(&self) -> Result<Results, StoreError> {
         let path = self.results_path();
-        let text = match fs::read_to_string(&path) {
-            Err(error) if error.kind() == io::ErrorKind::NotFound => String::new(),
+        let mut bytes = match fs::read(&path) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Vec::new(),
             read => read.map_err(refused("read the results", &path))?,
         };
+        // A kill may have cut the last line anywhere, inside a character too.
+        let end = bytes.iter().rposition(|byte| *byte == b'\n');
+        bytes.truncate(end.map_or(0, |end| end + 1));
+        let text = String::from_utf8(bytes).map_err(io::Error::other);
+        let text = text.map_err(refused("read the results", &path))?;
         Ok(Results::parse(&path.display().to_string(), &text)?)
     }
 
@@ -186,7 +201,7 @@ impl GridFolder {
     }
 
     /// Refuses results that the runs of a grid do not fit: other settings under the same name,
-    /// and, unless they may be mixed, rows of another revision.
+    /// and, unless they may be mixed, rows of another revision and runs that one began.
     ///
     /// # Errors
     /// [`Misfit`] names the run and what differs.
@@ -197,17 +212,9 @@ impl GridFolder {
         revision: Option<&str>,
     ) -> Result<(), StoreError> {
         for run in runs {
-            let there = match results.run(&run.key) {
-                Some(done) if done.end.settings == fingerprint(&run.config) => continue,
-                Some(done) => self
-                    .root
-                    .join(format!("settings/{}.toml", done.end.settings)),
-                None => self.run_path(&run.key).join("config.toml"),
+            let Some(there) = self.settings_of(run, results)? else {
+                continue; // as here, or not started
             };
-            let Ok(text) = fs::read_to_string(&there) else {
-                continue; // not started
-            };
-            let there = RunConfig::parse(&there.display().to_string(), &text)?;
             if let Some((key, there, here)) = first_difference(&there, &run.config) {
                 let run = run.key.name();
                 return Err(Misfit::OtherSettings {
@@ -220,21 +227,56 @@ impl GridFolder {
             }
         }
         let Some(here) = revision else { return Ok(()) };
-        let others: Vec<_> = results
-            .runs
-            .iter()
-            .filter(|run| run.end.revision != here)
-            .collect();
-        if let Some(first) = others.first() {
+        let mut others = Vec::new();
+        for run in &results.runs {
+            others.push((&run.key, run.end.revision.clone()));
+        }
+        for run in runs.iter().filter(|run| results.run(&run.key).is_none()) {
+            let begun = RunHistory::of(&self.run_path(&run.key));
+            let begun = begun.unwrap_or_default(); // a damaged one is told when the run goes on
+            if !begun.revisions.is_empty() {
+                others.push((&run.key, begun.revisions.join(" then ")));
+            }
+        }
+        others.retain(|(_, revision)| revision != here);
+        if let Some((first, there)) = others.first() {
             return Err(Misfit::OtherRevision {
                 n: others.len(),
-                run: first.key.name(),
-                there: first.end.revision.clone(),
+                run: first.name(),
+                there: there.clone(),
                 here: here.to_owned(),
             }
             .into());
         }
         Ok(())
+    }
+
+    /// The settings under which a run was finished or started where they may be others than the
+    /// grid's.
+    fn settings_of(
+        &self,
+        run: &GridRun,
+        results: &Results,
+    ) -> Result<Option<RunConfig>, StoreError> {
+        let path = match results.run(&run.key) {
+            Some(done) if done.end.settings == fingerprint(&run.config) => return Ok(None),
+            Some(done) => {
+                if let Some(config) = done.config()? {
+                    return Ok(Some(config));
+                }
+                let name = format!("settings/{}.toml", done.end.settings);
+                self.root.join(name)
+            }
+            None => {
+                let path = self.run_path(&run.key).join("config.toml");
+                if !path.exists() {
+                    return Ok(None);
+                }
+                path
+            }
+        };
+        let text = fs::read_to_string(&path).map_err(refused("read a run's settings", &path))?;
+        Ok(Some(RunConfig::parse(&path.display().to_string(), &text)?))
     }
 
     /// Removes what only going on would need: replay and checkpoints. Settings, metrics and the
@@ -273,41 +315,6 @@ impl GridFolder {
             fs::rename(&draft, &path)
         });
         written.map_err(refused("save", &path))
-    }
-}
-
-/// The first setting in which two trees differ, seeds aside: dotted path, and both values.
-fn first_difference(there: &RunConfig, here: &RunConfig) -> Option<(String, String, String)> {
-    let flat = |config: &RunConfig| {
-        let tree: toml::Table = toml::from_str(&without_seed(config).to_toml()).unwrap_or_default();
-        let mut leaves = Vec::new();
-        flatten("", &toml::Value::Table(tree), &mut leaves);
-        leaves
-    };
-    let (there, here) = (flat(there), flat(here));
-    let value = |leaves: &[(String, String)], key: &str| {
-        let found = leaves.iter().find(|(k, _)| k == key);
-        found.map_or_else(|| "nothing".to_owned(), |(_, value)| value.clone())
-    };
-    let mut keys = there.iter().chain(&here).map(|(key, _)| key);
-    keys.find_map(|key| {
-        let (there, here) = (value(&there, key), value(&here, key));
-        (there != here).then(|| (key.clone(), there, here))
-    })
-}
-
-fn flatten(path: &str, value: &toml::Value, leaves: &mut Vec<(String, String)>) {
-    let toml::Value::Table(table) = value else {
-        leaves.push((path.to_owned(), value.to_string()));
-        return;
-    };
-    for (key, value) in table {
-        let path = if path.is_empty() {
-            key.clone()
-        } else {
-            format!("{path}.{key}")
-        };
-        flatten(&path, value, leaves);
     }
 }
 

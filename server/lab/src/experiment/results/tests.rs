@@ -46,7 +46,7 @@ impl Place {
         let path = std::env::temp_dir().join(format!("stair-grid-{name}-{}", std::process::id()));
         let _ = std::fs::remove_dir_all(&path); // an earlier test run may have been killed
         let folder = GridFolder::at(&path);
-        folder.create("title = \"x\"").unwrap();
+        folder.create().unwrap();
         (Self(path), folder)
     }
 }
@@ -156,4 +156,63 @@ fn other_settings_under_the_same_name_and_rows_of_another_revision_are_named() {
         told.contains("feedback.budget = 2000") && told.contains("says 7"),
         "{told}"
     );
+}
+
+#[test]
+fn a_row_holds_its_settings_and_those_that_came_later_count_as_by_default() {
+    let (_place, folder) = Place::new("settings");
+    folder.add(&rows(1, "abc")).unwrap();
+    let mut results = folder.results().unwrap();
+    let config = RunConfig {
+        seed: 1,
+        ..RunConfig::default()
+    };
+    assert_eq!(results.runs[0].config().unwrap(), Some(config.clone()));
+
+    let end = &mut results.runs[0].end;
+    let temporal = end.config["temporal"].as_table_mut().unwrap();
+    temporal.remove("update_every").unwrap();
+    end.settings = "of before there was update_every".into();
+    let mut runs = [GridRun {
+        key: key(1),
+        config,
+    }];
+    folder.check(&runs, &results, None).unwrap();
+    runs[0].config.temporal.update_every = 77;
+    let told = folder.check(&runs, &results, None).unwrap_err().to_string();
+    assert!(
+        told.contains("temporal.update_every = ") && told.contains("says 77"),
+        "{told}"
+    );
+}
+
+#[test]
+fn a_run_that_another_revision_began_is_named() {
+    let (_place, folder) = Place::new("begun");
+    let config = RunConfig::default();
+    let path = folder.run_path(&key(1));
+    std::fs::create_dir_all(&path).unwrap();
+    std::fs::write(path.join("config.toml"), config.to_toml()).unwrap();
+    let history = r#"{"revisions": ["abc"], "machines": ["two cores"], "wall_s": 1.0}"#;
+    std::fs::write(path.join("history.json"), history).unwrap();
+    let runs = [GridRun {
+        key: key(1),
+        config,
+    }];
+    let results = Results::default();
+    folder.check(&runs, &results, Some("abc")).unwrap();
+    let told = folder.check(&runs, &results, Some("def"));
+    let told = told.unwrap_err().to_string();
+    assert!(told.contains("abc") && told.contains("def"), "{told}");
+    folder.check(&runs, &results, None).unwrap();
+}
+
+#[test]
+fn a_kill_inside_a_character_cuts_no_more_than_its_line() {
+    let (_place, folder) = Place::new("character");
+    folder.add(&rows(1, "abc")).unwrap();
+    let mut bytes = std::fs::read(folder.results_path()).unwrap();
+    bytes.extend_from_slice(&"{\"reason\":\"−".as_bytes()[..13]);
+    std::fs::write(folder.results_path(), bytes).unwrap();
+    assert_eq!(folder.results().unwrap().runs.len(), 1);
 }

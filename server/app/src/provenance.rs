@@ -1,18 +1,23 @@
 //! Which program, on which machine.
 
+use std::num::NonZeroUsize;
+
 use lab::history::Provenance;
 
-use super::experiment::processors;
-
 /// The program's commit.
-pub(super) const REVISION: &str = env!("STAIR_REVISION");
+pub const REVISION: &str = env!("STAIR_REVISION");
 
 /// Of a run that begins or goes on here.
-pub(super) fn here(device: &str) -> Provenance {
+pub fn here(device: &str) -> Provenance {
     Provenance {
         revision: REVISION.into(),
         machine: machine(device != "cpu"),
     }
+}
+
+/// Of this machine, as many as this process may use.
+pub fn processors() -> NonZeroUsize {
+    std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN)
 }
 
 /// `AMD EPYC 9R45, 2 cores`, with the graphics cards where runs use them.
