@@ -69,15 +69,19 @@ pub(super) fn state(experiment: &Experiment) -> String {
     }
     let results = experiment.results();
     let n = thousands(results.runs.len() as u64);
-    let mut state = match &experiment.progress {
-        Some(progress) => format!("{n} of {} runs", progress.n_runs),
-        None => format!("{n} runs"),
+    let progress = experiment.progress.as_ref();
+    let finished = progress.map_or_else(
+        || format!("{n} runs"),
+        |progress| format!("{n} of {} runs", progress.n_runs),
+    );
+    let failed = match results.failed.len() {
+        0 => String::new(),
+        n => format!(", {n} failed"),
     };
-    if !results.failed.is_empty() {
-        state += &format!(", {} failed", results.failed.len());
-    }
-    if experiment.progress.as_ref().is_some_and(|p| p.is_up) {
-        state += ", working";
-    }
-    state
+    let working = if progress.is_some_and(|progress| progress.is_up) {
+        ", working"
+    } else {
+        ""
+    };
+    finished + &failed + working
 }

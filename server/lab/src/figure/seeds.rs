@@ -123,7 +123,7 @@ impl Line {
         };
         let at = |seed: &Curve, x: f64| match between {
             Between::Line => Some(interpolate(seed, x)),
-            Between::Nothing => seed.iter().find(|p| p.0 == x).map(|p| p.1),
+            Between::Nothing => seed.iter().find(|p| p.0.total_cmp(&x).is_eq()).map(|p| p.1),
         };
         let mut grid = places(seeds);
         if between == Between::Line {
@@ -255,7 +255,7 @@ mod tests {
         let line = Line::of(&seeds, mean, Between::Nothing);
         let places: Vec<f64> = line.center.iter().map(|p| p.0).collect();
         assert_eq!(places, [40.0, 80.0, 160.0]);
-        assert_eq!(line.center[1].1, 1.0, "of the one seed there");
+        assert_eq!(line.center[1], (80.0, 1.0), "of the one seed there");
         let banded: Vec<f64> = line.band.iter().map(|p| p.0).collect();
         assert_eq!(banded, [40.0, 160.0], "one seed has no interval");
     }

@@ -4,6 +4,7 @@
 use std::collections::BTreeMap;
 
 use domain::agreement::interquartile_mean;
+use learn::stage::StageApproximator;
 
 use super::seeds::{
     Between, Curve, SeedSheet, add_line, drawn_lines, in_order_of_appearance, quoted,
@@ -182,7 +183,7 @@ impl StageGaps {
 fn unit(method: &str) -> &'static str {
     let recipe = method::find(method).map(|entry| (entry.build)(&RunConfig::default()));
     let stage = recipe.ok().and_then(|recipe| recipe.stage);
-    if stage.is_some_and(|stage| stage.is_of_intervals()) {
+    if stage.is_some_and(StageApproximator::is_of_intervals) {
         "share of an interval"
     } else {
         "nats" // the quadrilaterals, also as any method's sampler brings them along

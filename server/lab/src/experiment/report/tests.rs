@@ -410,8 +410,8 @@ fn three_seeds_alike_are_not_called_a_difference() {
         let method = "pebble";
         let success = &[0.0, 0.0, 0.5];
         six += &Told {
-            seed,
             method,
+            seed,
             success,
             ..STAIR
         }
