@@ -96,7 +96,7 @@ fn open(data: &Path, name: &str) -> Experiment {
     let text = |file: &str| std::fs::read_to_string(root.join(file)).unwrap_or_default();
     let rows = match std::fs::read_to_string(root.join("results.jsonl")) {
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(String::new()),
-        read => read.map_err(|error| format!("results.jsonl of {name}: {error}")),
+        read => read.map_err(|error| format!("{}: {error}", rows_of(name))),
     };
     let progress = serde_json::from_str::<Progress>(&text("progress.json")).ok();
     let progress = progress.map(|progress| Progress {
@@ -115,6 +115,11 @@ fn is_held(root: &Path) -> bool {
     log.is_ok_and(|log| matches!(log.try_lock(), Err(std::fs::TryLockError::WouldBlock)))
 }
 
+/// The file of an experiment's rows as people know it.
+fn rows_of(name: &str) -> String {
+    format!("experiments/{name}/results.jsonl")
+}
+
 fn described(
     name: &str,
     grid: &str,
@@ -128,7 +133,7 @@ fn described(
     );
     let (rows, damage) = match rows {
         Ok(rows) => {
-            let damage = Results::parse(name, &rows).err();
+            let damage = Results::parse(&rows_of(name), &rows).err();
             (rows, damage.map(|error| error.to_string()))
         }
         Err(damage) => (String::new(), Some(damage)),
@@ -149,7 +154,7 @@ impl Experiment {
     /// Runs that are over, and those that failed with the reason of each; none of rows that are
     /// damaged.
     pub fn results(&self) -> Results {
-        Results::parse(&self.name, &self.rows).unwrap_or_default()
+        Results::parse(&rows_of(&self.name), &self.rows).unwrap_or_default()
     }
 
     /// The report; empty before the first run is over. Made anew when there are new rows.
@@ -172,7 +177,7 @@ impl Experiment {
             return Ok(Arc::clone(report));
         }
         let file = RowFile {
-            name: self.name.clone(),
+            name: rows_of(&self.name),
             text: self.rows.clone(),
             settings: self.settings.clone(),
         };

@@ -53,13 +53,14 @@ pub async fn as_page(request: Request, next: Next) -> Response {
     }
 }
 
-/// Back to the run where it exists, and to the list of runs otherwise.
+/// Back to the run where it exists, and to the list of what was looked for otherwise.
 fn forward(path: &str, status: u16) -> (String, &'static str) {
     let mut parts = path.split('/').skip(1);
     match (parts.next(), parts.next(), parts.next()) {
         (Some("runs"), Some(run), Some(_)) if status != 404 => {
             (format!("/runs/{run}"), "Back to the run")
         }
+        (Some("experiments"), Some(_), _) => ("/experiments".to_owned(), "Experiments"),
         _ => ("/".to_owned(), "Tasks and runs"),
     }
 }
@@ -73,5 +74,6 @@ mod tests {
         assert_eq!(forward("/runs/7/pause", 409).0, "/runs/7");
         assert_eq!(forward("/runs/7/pause", 404).0, "/");
         assert_eq!(forward("/nowhere", 404).0, "/");
+        assert_eq!(forward("/experiments/nowhere", 404).0, "/experiments");
     }
 }
