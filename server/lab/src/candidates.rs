@@ -57,3 +57,85 @@ impl Pool {
         queries
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use domain::environment::{EpisodeEnd, TaskReward};
+    use domain::random::Stream;
+    use learn::replay::{NewStep, ReplayShape};
+
+    use super::*;
+
+    /// Complete episodes of these lengths.
+    fn replay(lens: &[u32]) -> Replay {
+        let shape = ReplayShape {
+            observation: 1,
+            action: 1,
+            pose: 0,
+        };
+        let mut replay = Replay::new(shape, 1);
+        for (seed, len) in (0_u64..).zip(lens) {
+            replay.begin_episode(0, seed, &[0.0], &[], None);
+            for t in 1..=*len {
+                let step = NewStep {
+                    action: &[0.0],
+                    learned_reward: 0.0,
+                    task_reward: TaskReward(0.0),
+                    success: false,
+                    stage: None,
+                    end: (t == *len).then_some(EpisodeEnd::TimeLimit),
+                    next_observation: &[0.0],
+                    next_pose: &[],
+                };
+                replay.push(0, step);
+            }
+        }
+        replay
+    }
+
+    fn pool(newest_episodes: usize, leaves_last_start: bool) -> Pool {
+        Pool {
+            newest_episodes,
+            segment_len: 5,
+            leaves_last_start,
+        }
+    }
+
+    /// Where the segments of many pairs begin: episode and step.
+    fn starts(pool: Pool, replay: &Replay) -> BTreeSet<(u32, u32)> {
+        let mut rng = Rng::new(1, Stream::Test, 0);
+        let drawn = pool.draw(replay, 500, &mut rng);
+        assert_eq!(drawn.len(), 500);
+        let segments = drawn.iter().flat_map(|query| {
+            assert_ne!(query.first, query.second, "a pair of two");
+            [query.first, query.second]
+        });
+        segments.map(|s| (s.episode.0, s.start)).collect()
+    }
+
+    #[test]
+    fn every_place_where_a_segment_fits_is_drawn_and_no_other() {
+        let replay = replay(&[9, 4, 7]); // the second is too short
+        let of = |episode, n| (0..n).map(move |start| (episode, start));
+        let expected: BTreeSet<_> = of(0, 5).chain(of(2, 3)).collect();
+        assert_eq!(starts(pool(3, false), &replay), expected);
+        let newest: BTreeSet<_> = of(2, 3).collect();
+        assert_eq!(starts(pool(2, false), &replay), newest);
+    }
+
+    #[test]
+    fn the_released_codes_slip_leaves_out_an_episodes_last_start_where_there_are_others() {
+        let replay = replay(&[9, 5]);
+        let expected: BTreeSet<_> = [(0, 0), (0, 1), (0, 2), (0, 3), (1, 0)].into();
+        assert_eq!(starts(pool(2, true), &replay), expected);
+    }
+
+    #[test]
+    fn where_there_is_one_segment_alone_there_is_no_pair() {
+        let mut rng = Rng::new(1, Stream::Test, 0);
+        let drawn = pool(1, false).draw(&replay(&[5]), 3, &mut rng);
+        assert_eq!(drawn, []);
+    }
+}

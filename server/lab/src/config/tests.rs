@@ -1,5 +1,6 @@
 use super::*;
 use crate::method;
+use learn::temporal::ContrastiveLoss;
 
 fn layers(presets: &[&str], overrides: &[&str]) -> Layers {
     Layers {
@@ -47,8 +48,57 @@ fn a_method_has_constants_of_its_own_for_some_tasks() {
     let mrn = |task| resolved("mrn", task).steering.every;
     let tasks = ["door-open", "walker-run", "quadruped-walk", "cheetah-run"];
     assert_eq!(tasks.map(mrn), [10_000, 1_000, 3_000, 5_000]);
-    let surf = |task| resolved("surf", task).semi_supervised.passes;
-    assert_eq!(["window-open", "cheetah-run"].map(surf), [20, 1_000]);
+    let least = |task| resolved("rime", task).denoising.least_epochs;
+    assert_eq!(["window-open", "quadruped-run"].map(least), [5, 15]);
+    let surf = |task| {
+        let config = resolved("surf", task).semi_supervised;
+        (config.passes, config.unlabeled_per_query)
+    };
+    assert_eq!(
+        ["window-open", "cheetah-run"].map(surf),
+        [(20, 10), (1_000, 100)]
+    );
+    let fits = |task| {
+        let reward = resolved("qpa", task).reward;
+        (reward.max_epochs, reward.stop_accuracy)
+    };
+    assert_eq!(
+        ["window-open", "walker-run"].map(fits),
+        [(200, 0.97), (2_000, 0.98)]
+    );
+}
+
+/// The paper's tables of hyper-parameters, for Meta-World and for the control suite.
+#[test]
+fn the_papers_table_is_printed_value_by_value() {
+    for (task, rate, every, batch) in [
+        ("window-open", 1e-4, 5_000, 512),
+        ("walker-run", 5e-4, 20_000, 1_024),
+    ] {
+        let layers = Layers {
+            task: Some(task.into()),
+            method: Some("rune".into()),
+            presets: vec!["paper_table".into()],
+            ..Layers::default()
+        };
+        let config = RunConfig::resolve(&layers).unwrap();
+        let agent = &config.agent;
+        let told = vec![
+            agent.actor_learning_rate,
+            agent.critic_learning_rate,
+            config.reward.learning_rate,
+            agent.initial_temperature,
+            agent.critic_ema,
+            config.bonus.decay,
+        ];
+        assert_eq!(told, vec![rate, rate, rate, 0.2, 0.01, 1e-3], "{task}");
+        assert_eq!(
+            (config.feedback.every, config.temporal.batch),
+            (every, batch),
+            "{task}"
+        );
+        assert_eq!(config.temporal.loss, ContrastiveLoss::Symmetric, "{task}");
+    }
 }
 
 #[test]
