@@ -10,7 +10,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use lab::experiment::Artifact;
 use lab::experiment::grid::{GridText, resolve, setting_names};
 use lab::experiment::report::{self, RowFile};
-use lab::experiment::results::{GridFolder, Results};
+use lab::experiment::results::{GridFolder, Results, read_rows};
 use serde::Deserialize;
 
 /// `(name, experiment.toml, results.jsonl)`
@@ -27,8 +27,8 @@ pub struct Experiment {
     pub about: String,
     /// JSON Lines.
     pub rows: String,
-    /// What is wrong with the rows, where they cannot be read.
-    pub damage: Option<String>,
+    /// What they say: runs that are over, and those that failed; else what is wrong with them.
+    pub results: Result<Results, String>,
     /// Its settings, in the order of its file.
     pub settings: Vec<String>,
     /// Where it is, while it runs.
@@ -94,7 +94,7 @@ pub fn find(data: &Path, name: &str) -> Option<Experiment> {
 fn open(data: &Path, name: &str) -> Experiment {
     let root = data.join("experiments").join(name);
     let text = |file: &str| std::fs::read_to_string(root.join(file)).unwrap_or_default();
-    let rows = match std::fs::read_to_string(root.join("results.jsonl")) {
+    let rows = match read_rows(&root.join("results.jsonl")) {
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(String::new()),
         read => read.map_err(|error| format!("{}: {error}", rows_of(name))),
     };
@@ -131,19 +131,16 @@ fn described(
         |_| (name.to_owned(), String::new()),
         |grid| (grid.title, grid.about),
     );
-    let (rows, damage) = match rows {
-        Ok(rows) => {
-            let damage = Results::parse(&rows_of(name), &rows).err();
-            (rows, damage.map(|error| error.to_string()))
-        }
-        Err(damage) => (String::new(), Some(damage)),
-    };
+    let results = rows
+        .as_ref()
+        .map_err(String::clone)
+        .and_then(|rows| Results::parse(&rows_of(name), rows).map_err(|error| error.to_string()));
     Experiment {
         name: name.to_owned(),
         title,
         about,
-        rows,
-        damage,
+        rows: rows.unwrap_or_default(), // results say what is wrong with them
+        results,
         settings: setting_names(source),
         progress,
         is_shipped: false,
@@ -151,12 +148,6 @@ fn described(
 }
 
 impl Experiment {
-    /// Runs that are over, and those that failed with the reason of each; none of rows that are
-    /// damaged.
-    pub fn results(&self) -> Results {
-        Results::parse(&rows_of(&self.name), &self.rows).unwrap_or_default()
-    }
-
     /// The report; empty before the first run is over. Made anew when there are new rows.
     ///
     /// # Errors
@@ -164,10 +155,13 @@ impl Experiment {
     pub fn report(&self) -> Result<Arc<Vec<Artifact>>, String> {
         type Made = (String, Arc<Vec<Artifact>>);
         static MADE: Mutex<BTreeMap<String, Made>> = Mutex::new(BTreeMap::new());
-        if let Some(damage) = &self.damage {
-            return Err(damage.clone());
-        }
-        if self.results().runs.is_empty() {
+        if self
+            .results
+            .as_ref()
+            .map_err(String::clone)?
+            .runs
+            .is_empty()
+        {
             return Ok(Arc::default());
         }
         let mut made = MADE.lock().unwrap_or_else(PoisonError::into_inner);
@@ -209,14 +203,14 @@ mod tests {
         std::fs::create_dir_all(data.path().join("experiments/mine")).unwrap();
         let mine = find(data.path(), "mine").unwrap();
         assert_eq!(
-            (mine.results(), mine.progress.clone()),
-            (Results::default(), None)
+            (mine.results.clone(), mine.progress.clone()),
+            (Ok(Results::default()), None)
         );
         assert!(mine.report().unwrap().is_empty());
         assert!(find(data.path(), "..").is_none());
 
         let rows = data.path().join("experiments/mine/results.jsonl");
-        for (damaged, told) in [(&b"{}\n"[..], "line 1"), (b"\xff\n", "UTF-8")] {
+        for (damaged, told) in [(&b"{}\n"[..], "line 1"), (b"\xff\n", "utf-8")] {
             std::fs::write(&rows, damaged).unwrap();
             let mine = find(data.path(), "mine").unwrap();
             let error = mine.report().unwrap_err();

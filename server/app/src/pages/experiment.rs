@@ -145,11 +145,12 @@ fn filled(experiment: &Experiment, report: &[Artifact]) -> ExperimentPage {
         running: up.map_or_else(Vec::new, |progress| {
             progress.running.iter().map(run_line).collect()
         }),
-        failed: if report.is_empty() {
-            let failed = experiment.results().failed.into_iter();
-            failed.map(|(key, reason)| (key.name(), reason)).collect()
-        } else {
-            Vec::new()
+        failed: match &experiment.results {
+            Ok(results) if report.is_empty() => {
+                let failed = results.failed.iter();
+                failed.map(|(key, why)| (key.name(), why.clone())).collect()
+            }
+            _ => Vec::new(),
         },
         figures: figures
             .map(|(svg, title)| Figure {

@@ -64,10 +64,9 @@ fn line(experiment: &Experiment) -> Line {
 
 /// How many runs are over, in words.
 pub(super) fn state(experiment: &Experiment) -> String {
-    if experiment.damage.is_some() {
+    let Ok(results) = &experiment.results else {
         return "its results cannot be read".to_owned();
-    }
-    let results = experiment.results();
+    };
     let n = thousands(results.runs.len() as u64);
     let progress = experiment.progress.as_ref();
     let finished = progress.map_or_else(

@@ -14,7 +14,7 @@ use crate::method;
 mod folder;
 mod settings;
 
-pub use folder::{GridFolder, Misfit, StoreError};
+pub use folder::{GridFolder, Misfit, StoreError, read_rows};
 pub use settings::fingerprint;
 pub(crate) use settings::first_difference;
 

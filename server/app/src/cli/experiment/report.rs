@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use lab::experiment::grid::{GridText, setting_names};
 use lab::experiment::report::{self, RowFile};
+use lab::experiment::results::read_rows;
 
 use super::write_with_picture;
 use crate::cli::BadInput;
@@ -55,8 +56,8 @@ fn file_of(path: &Path) -> PathBuf {
 fn read(path: &Path) -> Result<RowFile, BadInput> {
     let path = file_of(path);
     let name = path.display().to_string();
-    let text = std::fs::read_to_string(&path)
-        .map_err(|error| BadInput(format!("cannot read {name}: {error}")))?;
+    let text =
+        read_rows(&path).map_err(|error| BadInput(format!("cannot read {name}: {error}")))?;
     let grid = path.with_file_name("experiment.toml"); // rows alone will do
     let settings = std::fs::read_to_string(&grid).map_or_else(
         |_| Vec::new(),

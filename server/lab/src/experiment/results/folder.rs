@@ -134,15 +134,10 @@ impl GridFolder {
     /// A file that cannot be read, a line that is no row.
     pub fn results(&self) -> Result<Results, StoreError> {
         let path = self.results_path();
-        let mut bytes = match fs::read(&path) {
-            Err(error) if error.kind() == io::ErrorKind::NotFound => Vec::new(),
+        let text = match read_rows(&path) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => String::new(),
             read => read.map_err(refused("read the results", &path))?,
         };
-        // A kill may have cut the last line anywhere, inside a character too.
-        let end = bytes.iter().rposition(|byte| *byte == b'\n');
-        bytes.truncate(end.map_or(0, |end| end + 1));
-        let text = String::from_utf8(bytes).map_err(io::Error::other);
-        let text = text.map_err(refused("read the results", &path))?;
         Ok(Results::parse(&path.display().to_string(), &text)?)
     }
 
@@ -316,6 +311,18 @@ impl GridFolder {
         });
         written.map_err(refused("save", &path))
     }
+}
+
+/// The whole lines of a file of rows; a kill may have cut the last one anywhere, inside a
+/// character too.
+///
+/// # Errors
+/// A file that cannot be read or is no UTF-8.
+pub fn read_rows(path: &Path) -> io::Result<String> {
+    let mut bytes = fs::read(path)?;
+    let end = bytes.iter().rposition(|byte| *byte == b'\n');
+    bytes.truncate(end.map_or(0, |end| end + 1));
+    String::from_utf8(bytes).map_err(io::Error::other)
 }
 
 fn refused<'a>(doing: &'static str, path: &'a Path) -> impl FnOnce(io::Error) -> StoreError + 'a {
