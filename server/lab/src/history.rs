@@ -3,12 +3,15 @@
 use std::fs;
 use std::io;
 use std::path::Path;
+use std::sync::mpsc::Receiver;
 use std::time::Instant;
 
+use domain::teacher::Teacher;
 use serde::{Deserialize, Serialize};
 
 use crate::folder::{io_error, write_durably};
-use crate::run::RunError;
+use crate::message::{Command, Event};
+use crate::run::{Outcome, Run, RunError};
 
 const FILE: &str = "history.json";
 /// What cannot be read, kept for whoever wants to mend it.
@@ -115,6 +118,33 @@ impl<'a> Sitting<'a> {
             wall_s: self.before.wall_s + self.began.elapsed().as_secs_f64(),
             ..self.before.clone()
         }
+    }
+
+    /// Drives the run as [`Run::drive`] does, and keeps the whole with every checkpoint and at
+    /// the end.
+    ///
+    /// # Errors
+    /// What the run says; the disk where it refuses the history, after the run's own end.
+    ///
+    /// # Panics
+    /// Never.
+    pub fn drive(
+        &self,
+        run: &mut Run,
+        teacher: &mut dyn Teacher,
+        commands: &Receiver<Command>,
+        events: &mut dyn FnMut(Event),
+    ) -> Result<Outcome, RunError> {
+        let mut kept = Ok(());
+        let outcome = run.drive(teacher, commands, &mut |event| {
+            if matches!(event, Event::Checkpointed(_)) {
+                kept = self.keep();
+            }
+            events(event);
+        })?;
+        kept?;
+        self.keep()?;
+        Ok(outcome)
     }
 
     /// Keeps the whole so far.

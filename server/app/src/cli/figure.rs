@@ -230,16 +230,8 @@ mod tests {
         write(&foreign, b"no queries").unwrap();
         for (name, rows, said) in [
             ("strips", foreign, "is no packed query set"),
-            (
-                "strips",
-                folder.path().to_owned(),
-                "cannot read the run's settings",
-            ),
-            (
-                "temporal-map",
-                folder.path().to_owned(),
-                "cannot read the run's settings",
-            ),
+            ("strips", folder.path().to_owned(), "holds no run"),
+            ("temporal-map", folder.path().to_owned(), "holds no run"),
         ] {
             let mut args = args(rows, folder.path().join("figure.svg"));
             args.name = name.into();

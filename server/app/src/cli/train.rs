@@ -91,15 +91,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let (sender, commands) = channel();
     stop_when_told(sender, args.until_eof)?;
     let mut progress = Progress::new(&run, args.json);
-    let mut kept = Ok(());
-    let outcome = run.drive(&mut teacher, &commands, &mut |event| {
-        if matches!(event, Event::Checkpointed(_)) {
-            kept = sitting.keep();
-        }
+    let outcome = sitting.drive(&mut run, &mut teacher, &commands, &mut |event| {
         progress.show(&event);
     })?;
-    kept?;
-    sitting.keep()?;
     let wall_s = sitting.history().wall_s;
     progress.bar.finish_and_clear();
     let config = run.config();

@@ -77,15 +77,9 @@ impl Driver {
             self.log(&json!({"kind": "damaged_history", "complaint": complaint}));
         }
         let mut teacher = self.teacher(&row, &run)?;
-        let mut kept = Ok(());
-        let outcome = run.drive(teacher.as_mut(), commands, &mut |event| {
-            if matches!(event, Event::Checkpointed(_)) {
-                kept = sitting.keep();
-            }
+        let outcome = sitting.drive(&mut run, teacher.as_mut(), commands, &mut |event| {
             self.hear(event, &row, &config);
         })?;
-        kept?;
-        sitting.keep()?;
         match outcome {
             Outcome::Finished(finished) => Ok(StateLine::finished(&finished)),
             Outcome::Stopped => Ok(StateLine::stopped(run.step())),

@@ -76,7 +76,7 @@ mod tests {
             folder.path().display().to_string(),
             out.display().to_string(),
         );
-        assert!(told(&folder, &out).contains("cannot read the run's settings"));
+        assert!(told(&folder, &out).contains("holds no run"));
         assert!(!std::path::Path::new(&out).exists());
         assert!(told(&folder, "mine.png").contains("must end in .queries"));
     }

@@ -132,3 +132,109 @@ fn value(run: &RunResult, evaluation: &Evaluation) -> f64 {
         evaluation.return_mean
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::told::{STAIR, Told, run_from};
+    use super::*;
+
+    fn close(found: f64, expected: f64) {
+        assert!((found - expected).abs() < 1e-12, "{found} for {expected}");
+    }
+
+    #[test]
+    fn learning_is_the_difference_of_the_same_episodes() {
+        let found = learned(&run_from(&[1.0, 2.0, 6.0], &[11.0, 12.0, 16.0])).unwrap();
+        close(found.before, 3.0);
+        close(found.after, 13.0);
+        close(found.difference.value, 10.0);
+        close(found.difference.interval.lo, 10.0); // though the episodes differ
+        assert_eq!(found.n_episodes, 3);
+
+        let unsure = learned(&run_from(&[1.0, 5.0, 3.0], &[5.0, 1.0, 4.0])).unwrap();
+        assert!(unsure.difference.interval.contains(0.0));
+
+        assert_eq!(learned(&STAIR.run()), None); // not tried before it began
+        assert_eq!(learned(&run_from(&[], &[])), None); // rows of an older program
+        assert_eq!(learned(&run_from(&[1.0], &[1.0, 2.0])), None);
+    }
+
+    #[test]
+    fn a_score_leaves_out_what_was_before_the_first_step() {
+        let (with, without) = (score(&run_from(&[1.0], &[2.0])), score(&STAIR.run()));
+        assert_eq!(with, without);
+    }
+
+    #[test]
+    fn a_score_is_the_mean_of_the_last_ten_evaluations() {
+        const RISING: &[f64] = &[0.0, 0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0];
+        let found = score(
+            &Told {
+                success: RISING,
+                ..STAIR
+            }
+            .run(),
+        );
+        close(found.value, 0.55);
+        assert_eq!(found.n_evaluations, 10);
+        let few = score(&STAIR.run());
+        close(few.value, 0.5);
+        assert_eq!(few.n_evaluations, 3);
+    }
+
+    #[test]
+    fn the_area_is_that_of_trapezoids_by_the_width() {
+        // 1000 × 0.25 + 1000 × 0.75 over 2000 steps
+        close(area(&STAIR.run()), 0.5);
+        close(
+            area(
+                &Told {
+                    success: &[0.2, 0.2, 0.8, 0.8],
+                    ..STAIR
+                }
+                .run(),
+            ),
+            (0.2 + 0.5 + 0.8) / 3.0,
+        );
+        close(
+            area(
+                &Told {
+                    success: &[0.4],
+                    ..STAIR
+                }
+                .run(),
+            ),
+            0.4,
+        );
+    }
+
+    #[test]
+    fn a_share_of_success_is_reached_at_the_first_evaluation_with_it() {
+        let run = STAIR.run();
+        assert_eq!(
+            reached(&run, 0.5),
+            Some(Reached {
+                step: 2_000,
+                labels: 20
+            })
+        );
+        assert_eq!(
+            reached(&run, 0.8),
+            Some(Reached {
+                step: 3_000,
+                labels: 30
+            })
+        );
+        assert_eq!(
+            reached(
+                &Told {
+                    success: &[0.7],
+                    ..STAIR
+                }
+                .run(),
+                0.8
+            ),
+            None
+        );
+    }
+}
