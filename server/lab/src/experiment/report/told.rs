@@ -1,7 +1,8 @@
 //! Made-up runs for tests, told in rows as an experiment leaves them.
 
 use super::RowFile;
-use crate::experiment::results::{Content, Results, Row, RunKey, RunResult, RunRow};
+use crate::experiment::grid::RunKey;
+use crate::experiment::results::{Content, Results, Row, RunResult, RunRow};
 use crate::message::{Evaluation, SessionOffered};
 
 /// A run with these evaluations at every thousandth step, each after ten more answers.
