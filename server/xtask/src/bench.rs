@@ -4,7 +4,8 @@ use crate::failure::Failure;
 use crate::workspace::Workspace;
 use crate::{child, setup};
 
-/// Crates with an example named `bench`, cheapest to build first.
+/// Crates with an example named after them (`sim_bench`: one folder holds the examples of all),
+/// cheapest to build first.
 pub(crate) const CRATES: [&str; 4] = ["sim", "learn", "lab", "app"];
 
 /// Builds and runs the benchmarks of the named crates; none named means all.
@@ -19,7 +20,7 @@ pub(crate) fn run(workspace: &Workspace, crates: &[String]) -> Result<(), Failur
     for name in chosen {
         let mut cargo = workspace.cargo();
         cargo.args(["run", "--quiet", "--release", "--package", name]);
-        cargo.args(["--example", "bench"]);
+        cargo.args(["--example", &format!("{name}_bench")]);
         child::run(&format!("benchmark of {name} (builds first)"), &mut cargo)?;
     }
     println!("all benchmarks done; a difference below 1.2 times is noise");

@@ -1,5 +1,5 @@
 //! Control steps per second of every task, one thread, CPU time:
-//! `cargo run --release -p sim --example bench [SECONDS]`.
+//! `cargo run --release -p sim --example sim_bench [SECONDS]`.
 //!
 //! Each task plays whole episodes, resets and the policy's own cost included, once with random
 //! actions and once with its expert's, if it has one: contacts make the second one slower.

@@ -1,4 +1,4 @@
-//! What a run costs: `cargo run --release -p lab --example bench [ROW…]`.
+//! What a run costs: `cargo run --release -p lab --example lab_bench [ROW…]`.
 //!
 //! 1. 64 environments of each task stepped on one thread and on two. Two threads can only be seen
 //!    in wall time, so the machine should be idle; rounds are interleaved, the least of each counts.

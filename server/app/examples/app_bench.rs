@@ -1,4 +1,4 @@
-//! What pictures cost: `cargo run --release -p app --example bench [TASK…]`.
+//! What pictures cost: `cargo run --release -p app --example app_bench [TASK…]`.
 //!
 //! Plays a segment of 50 steps of every task, by its expert where it has one and by random actions
 //! otherwise, and draws it as the labeling page shows it. Processor time of the process, the

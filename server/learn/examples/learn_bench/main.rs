@@ -1,6 +1,6 @@
 //! CPU time of what learning does, on one thread, beside the floor of its arithmetic.
 //!
-//! `cargo xtask bench` (or `cargo run -p learn --example bench [-- NAME…]`) prints the table of
+//! `cargo xtask bench` (or `cargo run -p learn --example learn_bench [-- NAME…]`) prints the table of
 //! `PERFORMANCE.md` for the machine it runs on; names pick rows. Times are CPU time of the
 //! thread, the least of interleaved rounds, so that other work on the machine disturbs little.
 //! The floor is the row's matrix products at the rate of a 1024³ f32 product in the same run,
