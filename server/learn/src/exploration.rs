@@ -326,43 +326,22 @@ impl RunningStd {
 
 #[cfg(test)]
 mod tests {
-    use domain::environment::{EpisodeEnd, TaskReward};
     use domain::random::{Rng, Stream};
 
     use super::*;
-    use crate::replay::{NewStep, ReplayShape};
+    use crate::replay::walked::walked;
 
     fn replay(n_steps: usize) -> Replay {
-        let shape = ReplayShape {
-            observation: 7,
-            action: 1,
-            pose: 0,
-        };
-        let mut replay = Replay::new(shape, 1);
         let mut rng = Rng::new(1, Stream::Test, 0);
-        let mut state = || {
+        let mut state = |_| {
             let mut values = vec![0.0; 7];
             rng.fill_normal(&mut values);
             values
         };
-        for _ in 0..n_steps / 100 {
-            replay.begin_episode(0, 0, &state(), &[], None);
-            for t in 0..100 {
-                let next = state();
-                let step = NewStep {
-                    action: &[0.0],
-                    learned_reward: 0.0,
-                    task_reward: TaskReward(0.0),
-                    success: false,
-                    stage: None,
-                    end: (t == 99).then_some(EpisodeEnd::TimeLimit),
-                    next_observation: &next,
-                    next_pose: &[],
-                };
-                replay.push(0, step);
-            }
-        }
-        replay
+        walked(
+            7,
+            (0..n_steps / 100).map(|_| (0..=100).map(&mut state).collect()),
+        )
     }
 
     #[test]

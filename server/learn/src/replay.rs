@@ -486,3 +486,5 @@ fn row(values: &[f32], index: usize, size: usize) -> &[f32] {
 
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+pub(crate) mod walked;

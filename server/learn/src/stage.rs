@@ -108,12 +108,11 @@ pub fn interval_gap(first: (f32, f32), second: (f32, f32)) -> f32 {
 
 #[cfg(test)]
 mod tests {
-    use domain::environment::{EpisodeEnd, TaskReward};
     use domain::episode::EpisodeId;
 
     use super::*;
     use crate::device::Device;
-    use crate::replay::{NewStep, ReplayShape};
+    use crate::replay::walked::walked;
     use crate::temporal::TemporalConfig;
 
     fn query(first: (u32, u32), second: (u32, u32), len: u32) -> Query {
@@ -130,30 +129,11 @@ mod tests {
 
     /// Two episodes that walk along a line at different speeds.
     fn replay() -> Replay {
-        let shape = ReplayShape {
-            observation: 2,
-            action: 1,
-            pose: 0,
-        };
-        let mut replay = Replay::new(shape, 1);
-        for episode in 0..2_u8 {
-            let state = |t: u8| [f32::from(t) * (1.0 + f32::from(episode)), 1.0];
-            replay.begin_episode(0, 0, &state(0), &[], None);
-            for t in 1..=30 {
-                let step = NewStep {
-                    action: &[0.0],
-                    learned_reward: 0.0,
-                    task_reward: TaskReward(0.0),
-                    success: false,
-                    stage: None,
-                    end: (t == 30).then_some(EpisodeEnd::TimeLimit),
-                    next_observation: &state(t),
-                    next_pose: &[],
-                };
-                replay.push(0, step);
-            }
-        }
-        replay
+        let state = |speed: u8, t: u8| vec![f32::from(t * speed), 1.0];
+        walked(
+            2,
+            [1, 2].map(|speed| (0..=30).map(|t| state(speed, t)).collect()),
+        )
     }
 
     fn temporal() -> TemporalDistance {

@@ -1,7 +1,5 @@
-use domain::environment::{EpisodeEnd, TaskReward};
-
 use super::*;
-use crate::replay::{NewStep, ReplayShape};
+use crate::replay::walked::walked;
 
 const DOUBLE: (Kind, tch::Device) = (Kind::Double, tch::Device::Cpu);
 
@@ -161,37 +159,19 @@ impl Rooms {
 }
 
 fn chain_replay(n_episodes: usize, len: usize) -> Replay {
-    let shape = ReplayShape {
-        observation: Rooms::N,
-        action: 1,
-        pose: 0,
-    };
     let one_hot = |state: usize| {
-        let mut row = [0.0_f32; Rooms::N];
+        let mut row = vec![0.0; Rooms::N];
         row[state] = 1.0;
         row
     };
-    let mut replay = Replay::new(shape, 1);
-    for episode in 0..n_episodes {
+    let episode = |episode: usize| {
         let mut rng = Rng::new(3, Stream::Test, episode as u64);
-        let mut state = rng.below(Rooms::N);
-        replay.begin_episode(0, 0, &one_hot(state), &[], None);
-        for t in 1..=len {
-            state = Rooms::next(state, &mut rng);
-            let step = NewStep {
-                action: &[0.0],
-                learned_reward: 0.0,
-                task_reward: TaskReward(0.0),
-                success: false,
-                stage: None,
-                end: (t == len).then_some(EpisodeEnd::TimeLimit),
-                next_observation: &one_hot(state),
-                next_pose: &[],
-            };
-            replay.push(0, step);
-        }
-    }
-    replay
+        let first = rng.below(Rooms::N);
+        let states =
+            std::iter::successors(Some(first), |&state| Some(Rooms::next(state, &mut rng)));
+        states.take(len + 1).map(one_hot).collect()
+    };
+    walked(Rooms::N, (0..n_episodes).map(episode))
 }
 
 fn ranks(values: &[f64]) -> Vec<f64> {
