@@ -277,6 +277,61 @@ fn an_experiment_that_does_not_fit_is_named_with_its_line() {
 }
 
 #[test]
+fn results_that_do_not_go_together_are_named() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let here = folder.path();
+    let shipped = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../assets/results/go-fetch-return-80/results.jsonl"
+    );
+    let rows = std::fs::read_to_string(shipped).expect("rows that come with the program");
+    let of_a_kind = |keep: &dyn Fn(&serde_json::Value) -> bool,
+                     change: &dyn Fn(&mut serde_json::Value)| {
+        let rows = rows.lines().filter_map(|line| {
+            let mut row: serde_json::Value = serde_json::from_str(line).expect("a row");
+            let is_kept = row["method"] == "stair" && keep(&row);
+            change(&mut row);
+            is_kept.then(|| row.to_string() + "\n")
+        });
+        rows.collect::<String>()
+    };
+    let first = of_a_kind(&|row| row["seed"] == 1, &|_| ());
+    std::fs::write(here.join("first.jsonl"), &first).expect("a file");
+    let report = |other: &str, says: &[&str]| {
+        std::fs::write(here.join("other.jsonl"), other).expect("a file");
+        let arguments = [
+            "experiment",
+            "report",
+            "first.jsonl",
+            "other.jsonl",
+            "--out",
+            "report",
+        ];
+        expect(&arguments, here, says);
+        assert!(!here.join("report").exists(), "nothing is written");
+    };
+    let second =
+        |change: &dyn Fn(&mut serde_json::Value)| of_a_kind(&|row| row["seed"] == 2, change);
+    report(
+        &second(&|row| row["task"] = "window-open".into()),
+        &["different tasks", "window-open"],
+    );
+    let of_finished = |row: &mut serde_json::Value, key: &str, value: serde_json::Value| {
+        if row["kind"] == "finished" {
+            row[key] = value;
+        }
+    };
+    report(
+        &second(&|row| of_finished(row, "budget", 96.into())),
+        &["budget", "80", "96"],
+    );
+    report(
+        &second(&|row| of_finished(row, "revision", "0123abc".into())),
+        &["0123abc (1 run", "--mixed"],
+    );
+}
+
+#[test]
 fn a_reader_that_has_seen_enough_is_no_error() {
     for arguments in [
         &["tasks"][..],

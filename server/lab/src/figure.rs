@@ -241,7 +241,7 @@ fn shown_method(name: &str) -> String {
         "stair", "pebble", "rune", "mrn", "rime", "qpa", "surf", "sac",
     ];
     let is_acronym = |word: &str| ACRONYMS.contains(&word);
-    let words = name.split('-').map(|word| {
+    let words = name.split(['-', '_']).map(|word| {
         if is_acronym(word) {
             word.to_uppercase()
         } else {
@@ -259,6 +259,13 @@ mod tests {
     fn a_mistyped_figure_is_answered_with_the_nearest_one() {
         let told = find("curvse").err().map(|e| e.to_string()).unwrap();
         assert!(told.contains("curves"), "{told}");
+    }
+
+    #[test]
+    fn acronyms_in_a_methods_name_are_written_as_such() {
+        assert_eq!(shown_method("stair_isr"), "STAIR isr");
+        assert_eq!(shown_method("surf_whole"), "SURF whole");
+        assert_eq!(shown_method("uniform"), "uniform");
     }
 
     #[test]

@@ -7,7 +7,7 @@ use learn::LearnError;
 use learn::checkpoint::Archive;
 use learn::device::Device;
 use learn::exploration::StateEntropy;
-use learn::replay::{BatchRule, Replay, RewardSource};
+use learn::replay::{Batch, BatchRule, Replay, RewardSource};
 use learn::reward::{Labeled, Lesson, RewardEnsemble, RewardFit, RewardLearner, SteeringConfig};
 use learn::sac::{Act, Sac, SacMetrics};
 use learn::temporal::{TemporalDistance, TemporalMetrics};
@@ -89,7 +89,7 @@ impl Learner {
             seed,
             ..
         } = self;
-        let (batch, scale, seed) = (*batch, *task_reward_scale, *seed);
+        let (batch, reward_scale, seed) = (*batch, *task_reward_scale, *seed);
         let update_agent = || -> Vec<SacMetrics> {
             learn::device::init();
             (0..due.n_updates)
@@ -98,8 +98,8 @@ impl Learner {
                     let mut sample = replay.draw(batch, &mut rng, &due.batches);
                     if due.is_exploring {
                         sample.reward = exploration.intrinsic(&sample.observation, replay);
-                    } else if due.batches.reward == RewardSource::Task {
-                        sample.reward.iter_mut().for_each(|r| *r *= scale);
+                    } else {
+                        scale(&mut sample, &due.batches, reward_scale);
                     }
                     agent.update(&sample)
                 })
@@ -180,7 +180,7 @@ impl Learner {
     }
 
     /// The end of pre-training: a fresh critic on relabelled experience, and a head start.
-    pub(crate) fn begin_preference_learning(
+    pub(crate) fn end_exploration(
         &mut self,
         config: &RunConfig,
         replay: &Replay,
@@ -191,9 +191,16 @@ impl Learner {
         }
         for _ in 0..config.training.updates_after_reset {
             let mut rng = Rng::new(self.seed, Stream::Batch, self.agent.n_updates());
-            self.agent
-                .update(&replay.draw(self.batch, &mut rng, batches));
+            let mut sample = replay.draw(self.batch, &mut rng, batches);
+            scale(&mut sample, batches, self.task_reward_scale);
+            self.agent.update(&sample);
         }
+    }
+
+    /// How often critics were made anew.
+    #[cfg(test)]
+    pub(crate) fn n_critic_resets(&self) -> u64 {
+        self.agent.n_critic_resets()
     }
 
     /// Leads the agent's learning rates and entropy to their last ones with the part of the run
@@ -248,5 +255,12 @@ impl Learner {
         let mut archive = Archive::new();
         self.save(&mut archive);
         archive.fingerprint()
+    }
+}
+
+/// Brings task rewards to the size that learned ones have.
+fn scale(sample: &mut Batch, rule: &BatchRule, scale: f32) {
+    if rule.reward == RewardSource::Task {
+        sample.reward.iter_mut().for_each(|r| *r *= scale);
     }
 }

@@ -282,9 +282,7 @@ impl Run {
         let fit = self.learner.fit_reward(&self.replay, &labeled, &unlabeled);
         self.learner.reward.relabel(&mut self.replay);
         if is_first {
-            let batches = self.batches(self.progress.step);
-            self.learner
-                .begin_preference_learning(&self.config, &self.replay, &batches);
+            self.end_exploration();
         }
         let closed = SessionClosed {
             session: session.index(),
@@ -327,6 +325,9 @@ impl Run {
             updates.agent.push(steered);
         }
         self.meter.record(&updates);
+        if self.method.sampler.is_none() && self.is_exploring(before) && !self.is_exploring(now) {
+            self.end_exploration();
+        }
 
         if Every(self.config.training.metrics_every).is_crossed(before, now) {
             let row = self
@@ -353,10 +354,27 @@ impl Run {
         }
     }
 
+    /// Whether the agent explores for the states' own sake at an environment step: before the
+    /// first fit, or for a method that asks nothing, where it wants that, before the step at which
+    /// others ask first.
+    fn is_exploring(&self, step: u64) -> bool {
+        if self.method.sampler.is_some() {
+            self.progress.n_fits == 0
+        } else {
+            self.config.exploration.is_unsupervised && step < self.config.feedback.first_step
+        }
+    }
+
+    fn end_exploration(&mut self) {
+        let batches = self.batches(self.progress.step);
+        self.learner
+            .end_exploration(&self.config, &self.replay, &batches);
+    }
+
     /// Which updates fall into the steps (before, now].
     fn due(&self, before: u64, now: u64) -> Due {
-        let (t, is_asking) = (&self.config.training, self.method.sampler.is_some());
-        let is_exploring = is_asking && self.progress.n_fits == 0;
+        let t = &self.config.training;
+        let is_exploring = self.is_exploring(before);
         let has_target = !is_exploring || self.config.exploration.is_unsupervised;
         let owed =
             |step: u64| (step.saturating_sub(t.seed_steps) as f64 * t.updates_per_step) as u64;

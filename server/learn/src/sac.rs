@@ -323,6 +323,11 @@ impl Sac {
         self.n_updates
     }
 
+    /// How often critics were made anew.
+    pub fn n_critic_resets(&self) -> u64 {
+        self.n_critic_resets
+    }
+
     /// The weights that [`Act::Mean`] acts with, alone.
     pub fn save_policy(&self, archive: &mut Archive) {
         match &self.average {

@@ -27,6 +27,43 @@ fn every_preset_resolves_for_every_task_and_method() {
     }
 }
 
+/// ALGORITHMS.md 7: answers in all and in a session, steps between sessions, the first session.
+#[test]
+fn feedback_is_as_the_paper_gives_it_for_each_task() {
+    let control = |n, every| (n, n / 10, every, 10_000);
+    let meta_world = |n| (n, 50, 5_000, 10_000);
+    for (task, expected) in [
+        ("walker-run", control(1_000, 20_000)),
+        ("cheetah-run", control(1_000, 20_000)),
+        ("quadruped-walk", control(2_000, 30_000)),
+        ("quadruped-run", control(2_000, 30_000)),
+        ("door-open", meta_world(5_000)),
+        ("sweep-into", meta_world(10_000)),
+        ("window-open", meta_world(2_000)),
+        ("window-close", meta_world(2_000)),
+        ("door-unlock", meta_world(5_000)),
+        ("faucet-open", meta_world(3_000)),
+        ("push-green", meta_world(1_000)),
+        ("drawer-open", meta_world(3_000)),
+    ] {
+        for method in ["stair", "pebble"] {
+            let layers = Layers {
+                task: Some(task.into()),
+                method: Some(method.into()),
+                ..Layers::default()
+            };
+            let found = RunConfig::resolve(&layers).unwrap().feedback;
+            let found = (
+                found.budget,
+                found.queries_per_session,
+                found.every,
+                found.first_step,
+            );
+            assert_eq!(found, expected, "{task}, {method}");
+        }
+    }
+}
+
 /// ALGORITHMS.md 5 and the paper's tables of hyper-parameters.
 #[test]
 fn a_method_has_constants_of_its_own_for_some_tasks() {
@@ -48,6 +85,7 @@ fn a_method_has_constants_of_its_own_for_some_tasks() {
     let mrn = |task| resolved("mrn", task).steering.every;
     let tasks = ["door-open", "walker-run", "quadruped-walk", "cheetah-run"];
     assert_eq!(tasks.map(mrn), [10_000, 1_000, 3_000, 5_000]);
+    assert_eq!(mrn("go-fetch-return"), 500);
     let least = |task| resolved("rime", task).denoising.least_epochs;
     assert_eq!(["window-open", "quadruped-run"].map(least), [5, 15]);
     let surf = |task| {

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::grid::RunKey;
 use crate::config::{ConfigError, RunConfig, find_task};
 use crate::history::RunHistory;
-use crate::message::{Evaluation, Event, SessionOffered};
+use crate::message::{Evaluation, Event, SessionClosed, SessionOffered};
 use crate::method;
 
 mod folder;
@@ -37,6 +37,8 @@ pub enum Content {
     Evaluation(Evaluation),
     /// A session of queries as it was asked.
     Session(SessionOffered),
+    /// The same session when its answers were there.
+    Answered(SessionClosed),
     /// All rows of the run are above.
     Finished(RunRow),
     /// The run could not go on; it is tried again at the next start.
@@ -102,6 +104,7 @@ pub fn rows_of_run(
         match event {
             Event::Evaluation(e) => rows.push(row(Content::Evaluation(e))),
             Event::SessionOffered(s) => rows.push(row(Content::Session(s))),
+            Event::SessionClosed(s) => rows.push(row(Content::Answered(s))),
             Event::Finished(f) => {
                 let asks = method::find(&config.method)
                     .is_ok_and(|method| (method.build)(config).sampler.is_some());
@@ -147,6 +150,8 @@ pub struct RunResult {
     pub evaluations: Vec<Evaluation>,
     /// In order of steps.
     pub sessions: Vec<SessionOffered>,
+    /// In order of steps; none in rows of the program's earlier revisions.
+    pub answered: Vec<SessionClosed>,
     /// How it ended.
     pub end: RunRow,
 }
@@ -158,7 +163,8 @@ impl Results {
     /// A line in between that is no row, with its file and line; a run that is there twice.
     pub fn parse(name: &str, text: &str) -> Result<Self, ConfigError> {
         let mut results = Self::default();
-        let (mut evaluations, mut sessions, mut at) = (Vec::new(), Vec::new(), 0_u64);
+        let (mut evaluations, mut sessions, mut answered) = (Vec::new(), Vec::new(), Vec::new());
+        let mut at = 0_u64;
         let n_lines = text.lines().count();
         for (n, line) in text.split_inclusive('\n').enumerate() {
             at += line.len() as u64;
@@ -174,6 +180,7 @@ impl Results {
             match row.content {
                 Content::Evaluation(e) => evaluations.push((row.key, e)),
                 Content::Session(s) => sessions.push((row.key, s)),
+                Content::Answered(s) => answered.push((row.key, s)),
                 Content::Failed { reason, .. } => {
                     results.failed.retain(|f| !of_run(f));
                     results.failed.push((row.key, reason));
@@ -190,6 +197,7 @@ impl Results {
                     results.runs.push(RunResult {
                         evaluations: own(&mut evaluations, &row.key),
                         sessions: own(&mut sessions, &row.key),
+                        answered: own(&mut answered, &row.key),
                         key: row.key,
                         end,
                     });

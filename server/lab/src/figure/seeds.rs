@@ -94,9 +94,11 @@ pub(super) fn draw_seeds(
         panel.band(svg, &line.band, series(n).color);
     }
     for (n, seeds) in groups.iter().enumerate() {
+        let look = series(n);
         let thin = Pen {
             opacity: 0.3,
-            ..Pen::solid(series(n).color, 0.8)
+            dash: look.thin_dash,
+            ..Pen::solid(look.color, 0.8)
         };
         for seed in seeds {
             panel.line(svg, seed, thin);

@@ -38,7 +38,11 @@ impl Trained {
             overrides: overrides.map(ToString::to_string).collect(),
             ..Layers::default()
         });
-        let name = format!("stair-run-{method}-{}-{}", more.len(), std::process::id());
+        let name = format!(
+            "stair-run-{method}-{}-{}",
+            more.join(","),
+            std::process::id()
+        );
         let folder = std::env::temp_dir().join(name);
         let _ = std::fs::remove_dir_all(&folder); // an earlier test run may have been killed
         let mut run = Run::start(config.expect("settings"), &folder).expect("a run");
@@ -54,6 +58,28 @@ impl Drop for Trained {
     fn drop(&mut self) {
         let _ = std::fs::remove_dir_all(&self.folder); // best effort: it is a temporary folder
     }
+}
+
+#[test]
+fn sac_explores_first_where_it_is_told_to() {
+    let resets = |more: &[&str]| {
+        let trained = Trained::new("sac", more);
+        trained.run.learner.n_critic_resets()
+    };
+    assert_eq!(resets(&[]), 0);
+    let released = [
+        "exploration.is_unsupervised=true",
+        "training.reset_critic=true",
+    ];
+    assert_eq!(
+        resets(&released),
+        1,
+        "once, at the step of the first session"
+    );
+
+    // Without a reset the way that it goes is another from the first exploring update on.
+    let weights = |more: &[&str]| Trained::new("sac", more).run.learner.fingerprint();
+    assert_ne!(weights(&[]), weights(&["exploration.is_unsupervised=true"]));
 }
 
 #[test]

@@ -104,13 +104,15 @@ impl<'a> Pool<'a> {
             {
                 match self.start(run) {
                     Ok(worker) => up.push(worker),
-                    Err(error) => self.fail(run, format!("{error:#}"), &mut tally)?,
+                    Err(error) => {
+                        self.fail(run, format!("{error:#}"), &mut tally, &mut progress)?;
+                    }
                 }
             }
             for mut worker in std::mem::take(&mut up) {
                 match worker.child.try_wait().context("cannot watch a run")? {
                     None => up.push(worker),
-                    Some(status) => self.close(&worker, status, &mut tally, &progress)?,
+                    Some(status) => self.close(&worker, status, &mut tally, &mut progress)?,
                 }
             }
             progress.show(&tally, &waiting, &up)?;
@@ -168,7 +170,7 @@ impl<'a> Pool<'a> {
         worker: &Worker,
         status: ExitStatus,
         tally: &mut Tally,
-        progress: &Progress,
+        progress: &mut Progress<'_>,
     ) -> anyhow::Result<()> {
         let (run, key) = (worker.run, &worker.run.key);
         let path = self.folder.run_path(key);
@@ -182,22 +184,23 @@ impl<'a> Pool<'a> {
                         progress.say(&error.to_string());
                     }
                 }
-                Err(error) => {
-                    let reason = format!("{error:#}");
-                    progress.say(&format!("failed {}: {reason}", key.name()));
-                    self.fail(run, reason, tally)?;
-                }
+                Err(error) => self.fail(run, format!("{error:#}"), tally, progress)?,
             },
             End::Stopped => progress.say(&format!("stopped {}", key.name())),
-            End::Failed(reason) => {
-                progress.say(&format!("failed {}: {reason}", key.name()));
-                self.fail(run, reason, tally)?;
-            }
+            End::Failed(reason) => self.fail(run, reason, tally, progress)?,
         }
         Ok(())
     }
 
-    fn fail(&self, run: &GridRun, reason: String, tally: &mut Tally) -> anyhow::Result<()> {
+    fn fail(
+        &self,
+        run: &GridRun,
+        reason: String,
+        tally: &mut Tally,
+        progress: &mut Progress<'_>,
+    ) -> anyhow::Result<()> {
+        progress.say(&format!("failed {}: {reason}", run.key.name()));
+        progress.gives_up(run);
         self.folder.add_failure(&run.key, &reason, REVISION)?;
         tally.failed.push((run.key.name(), reason));
         Ok(())
@@ -288,6 +291,11 @@ impl<'a> Progress<'a> {
         } else {
             eprintln!("{line}");
         }
+    }
+
+    /// What a failed run had left is not done, and not to be done either.
+    fn gives_up(&mut self, run: &GridRun) {
+        self.at_first -= left_s(self.folder, run);
     }
 
     fn show(

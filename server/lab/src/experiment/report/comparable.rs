@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::ReportError;
+use crate::config::RunConfig;
 use crate::experiment::results::{Results, RunResult, first_difference};
 
 /// Refuses what must not be compared.
@@ -111,8 +112,8 @@ fn once(files: &[(&str, Results)]) -> Result<(), ReportError> {
     Ok(())
 }
 
-/// Two runs of one task in one setting were trained as long, on as many answers, and tried alike;
-/// two that differ by their seed alone had the same settings.
+/// Two runs of one task in one setting were trained as long, on as many answers, asked for alike,
+/// and tried alike; two that differ by their seed alone had the same settings.
 fn terms(first: &RunResult, second: &RunResult) -> Result<(), ReportError> {
     let (a, b) = (&first.key, &second.key);
     if (&a.task, &a.setting) != (&b.task, &b.setting) {
@@ -149,14 +150,39 @@ fn terms(first: &RunResult, second: &RunResult) -> Result<(), ReportError> {
             &y.evaluation_every,
         );
     }
-    let is_of_one_group = (&a.method, &a.teacher) == (&b.method, &b.teacher);
-    if is_of_one_group && x.settings != y.settings {
-        let (Some(there), Some(here)) = (first.config()?, second.config()?) else {
-            return differ("settings", &x.settings, &y.settings);
-        };
-        if let Some((key, there, here)) = first_difference(&there, &here) {
-            return differ(&key, &there, &here);
-        }
+    if x.settings == y.settings {
+        return Ok(());
     }
-    Ok(())
+    let is_of_one_group = (&a.method, &a.teacher) == (&b.method, &b.teacher);
+    let (Some(there), Some(here)) = (first.config()?, second.config()?) else {
+        return if is_of_one_group {
+            differ("settings", &x.settings, &y.settings)
+        } else {
+            Ok(())
+        };
+    };
+    let found = if is_of_one_group {
+        first_difference(&there, &here)
+    } else if both_ask {
+        first_difference(&only_terms(&there), &only_terms(&here))
+    } else {
+        None
+    };
+    match found {
+        Some((key, there, here)) => differ(&key, &there, &here),
+        None => Ok(()),
+    }
+}
+
+/// What methods have to share to be held against each other: the environment, how often they are
+/// updated, when and how much is asked, and how long the segments are. All else is as by default.
+fn only_terms(config: &RunConfig) -> RunConfig {
+    let mut terms = RunConfig {
+        environment: config.environment,
+        feedback: config.feedback,
+        ..RunConfig::default()
+    };
+    terms.training.updates_per_step = config.training.updates_per_step;
+    terms.queries.segment_len = config.queries.segment_len;
+    terms
 }

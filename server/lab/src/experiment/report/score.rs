@@ -120,6 +120,12 @@ pub(super) fn gap_ratio(run: &RunResult) -> Option<f64> {
     )
 }
 
+/// Share of answers that the task reward gives too, mean over sessions; `None` where no session
+/// had an answer that could be held against it, and in rows of before it stood in them.
+pub(super) fn oracle_agreement(run: &RunResult) -> Option<f64> {
+    mean_of(run.answered.iter().map(|s| s.oracle_agreement))
+}
+
 fn mean_of(values: impl Iterator<Item = Option<f64>>) -> Option<f64> {
     let values: Vec<f64> = values.flatten().collect();
     (!values.is_empty()).then(|| mean(&values))

@@ -164,6 +164,73 @@ fn settings_that_differ_are_told_by_name_and_those_that_came_later_are_as_by_def
 }
 
 #[test]
+fn methods_that_were_asked_otherwise_are_not_held_against_each_other() {
+    let with = |method: &'static str, budget, change: &dyn Fn(&mut RunConfig)| {
+        let told = Told { method, ..STAIR };
+        let mut config = RunConfig::default();
+        change(&mut config);
+        told.rows(RunRow {
+            settings: method.into(),
+            budget,
+            config: toml::from_str(&config.to_toml()).unwrap(),
+            ..told.end()
+        })
+    };
+    let stair = with("stair", 80, &|_| {});
+    let own_network = with("pebble", 80, &|config| config.agent.batch = 77);
+    make(&[file("a", stair.clone() + &own_network)], false).unwrap();
+    let seldom = |config: &mut RunConfig| config.feedback.every = 7_777;
+    let error = make(
+        &[file("a", stair.clone() + &with("pebble", 80, &seldom))],
+        false,
+    );
+    let told = error.unwrap_err().to_string();
+    assert!(
+        told.contains("feedback.every") && told.contains("7777"),
+        "{told}"
+    );
+    make(&[file("a", stair + &with("sac", 0, &seldom))], false).unwrap();
+}
+
+#[test]
+fn a_share_is_reached_by_the_seed_in_the_middle_and_never_comes_last() {
+    let seeds = |successes: [&'static [f64]; 3]| {
+        let told = (1..).zip(successes).map(|(seed, success)| {
+            let told = Told {
+                seed,
+                success,
+                ..STAIR
+            };
+            told.text()
+        });
+        let text = told.collect::<String>();
+        make(&[file("a", text)], false).unwrap().remove(0).text
+    };
+    let most = seeds([&[0.0, 0.6, 0.0], &[0.6, 0.0, 0.0], &[0.0; 3]]);
+    assert!(most.contains("| 20 (2000), 2 of 3 seeds |"), "{most}");
+    let few = seeds([&[0.6, 0.0, 0.0], &[0.0; 3], &[0.0; 3]]);
+    assert!(few.contains("| never, but 1 of 3 seeds |"), "{few}");
+}
+
+#[test]
+fn how_often_a_teacher_erred_is_told_where_one_did() {
+    let text = |oracle_agreement| {
+        let told = Told {
+            oracle_agreement,
+            ..STAIR
+        };
+        make(&[file("a", told.text())], false).unwrap()
+    };
+    let erred = text(Some(0.9));
+    assert!(erred[0].text.contains("| stair | – | 0.90 |"));
+    let scores = erred.iter().find(|a| a.name == "scores.csv").unwrap();
+    assert!(scores.text.contains(",oracle_agreement,") && scores.text.contains(",0.9,"));
+    for never in [Some(1.0), None] {
+        assert!(!text(never)[0].text.contains("the task reward gives too"));
+    }
+}
+
+#[test]
 fn three_seeds_alike_are_not_called_a_difference() {
     let report = &make(&[file("rows.jsonl", three_seeds_each())], false).unwrap()[0].text;
     assert!(

@@ -3,7 +3,7 @@
 use super::RowFile;
 use crate::experiment::grid::RunKey;
 use crate::experiment::results::{Content, Results, Row, RunResult, RunRow};
-use crate::message::{Evaluation, SessionOffered};
+use crate::message::{Evaluation, SessionClosed, SessionOffered};
 
 /// A run with these evaluations at every thousandth step, each after ten more answers.
 pub(super) struct Told {
@@ -14,6 +14,7 @@ pub(super) struct Told {
     pub budget: u32,
     pub success: &'static [f64],
     pub same_stage: f64,
+    pub oracle_agreement: Option<f64>,
 }
 
 pub(super) const STAIR: Told = Told {
@@ -24,6 +25,7 @@ pub(super) const STAIR: Told = Told {
     budget: 80,
     success: &[0.0, 0.5, 1.0],
     same_stage: 0.75,
+    oracle_agreement: None,
 };
 
 impl Told {
@@ -65,6 +67,15 @@ impl Told {
             stage_gap_pool: Some(4.0),
             same_stage_chosen: Some(self.same_stage),
         })];
+        contents.push(Content::Answered(SessionClosed {
+            session: 1,
+            step: 1_500,
+            labels: 15,
+            epochs: 1,
+            loss: 0.1,
+            accuracy: 1.0,
+            oracle_agreement: self.oracle_agreement,
+        }));
         contents.extend(self.success.iter().enumerate().map(|(n, success)| {
             Content::Evaluation(Evaluation {
                 step: 1_000 * (n as u64 + 1),

@@ -82,6 +82,8 @@ pub(crate) struct Series {
     pub color: &'static str,
     /// Strokes and gaps.
     pub dash: &'static str,
+    /// Those of its single seeds: unbroken while colours tell the series apart.
+    pub thin_dash: &'static str,
     /// Of its points.
     pub marker: Marker,
 }
@@ -99,7 +101,7 @@ impl Series {
 }
 
 /// The look of the n-th series: colours of Okabe and Ito (2008), without the yellow, which is
-/// too pale on paper. After seven they start over with other dashes.
+/// too pale on paper. After seven they start over with other dashes and markers.
 pub(crate) fn series(n: usize) -> Series {
     const LOOKS: [(&str, &str, Marker); 7] = [
         ("#0072b2", "", Marker::Disc),
@@ -110,16 +112,13 @@ pub(crate) fn series(n: usize) -> Series {
         ("#56b4e9", "12 4", Marker::Pentagon),
         ("#000000", "1.5 3", Marker::Hexagon),
     ];
-    let (color, dash, marker) = LOOKS[n % LOOKS.len()];
-    let dash = if n < LOOKS.len() {
-        dash
-    } else {
-        LOOKS[(n + n / LOOKS.len()) % LOOKS.len()].1
-    };
+    let round = n / LOOKS.len();
+    let look = |ahead: usize| LOOKS[(n + ahead) % LOOKS.len()];
     Series {
-        color,
-        dash,
-        marker,
+        color: look(0).0,
+        dash: look(round).1,
+        thin_dash: if round == 0 { "" } else { "3 2" },
+        marker: look(2 * round).2,
     }
 }
 
@@ -151,6 +150,15 @@ mod tests {
                 let (a, b) = (series(n), series(m));
                 assert!(a.dash != b.dash || a.marker != b.marker, "{m} and {n}");
             }
+        }
+    }
+
+    #[test]
+    fn seeds_of_two_series_of_one_colour_can_be_told_apart() {
+        for n in 0..7 {
+            let (first, again) = (series(n), series(n + 7));
+            assert_eq!(first.color, again.color);
+            assert_ne!(first.thin_dash, again.thin_dash, "{n}");
         }
     }
 
