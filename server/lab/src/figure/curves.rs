@@ -1,8 +1,10 @@
 //! Learning curves: one panel a task, one line a method, every seed thin behind. Where several
-//! methods are there in several settings each setting has a panel of its own.
+//! methods are there in several settings each setting has a panel of its own; where there are more
+//! lines than colours, each has one beside the first line.
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::plot::N_COLORS;
 use super::seeds::{
     Between, Curve, SeedSheet, add_line, drawn_lines, in_order_of_appearance, quoted,
 };
@@ -84,6 +86,32 @@ impl Plan {
         self.groups.iter().map(of_group).collect()
     }
 
+    /// A panel, or, with more groups than colours, one for each group beside the first.
+    fn apart(&self, title: &str, groups: Vec<Vec<Curve>>) -> Vec<(String, Vec<Vec<Curve>>)> {
+        let there = (1..groups.len()).filter(|n| !groups[*n].is_empty());
+        let there: Vec<usize> = there.collect();
+        if there.len() < N_COLORS {
+            return vec![(title.to_owned(), groups)];
+        }
+        let beside_first = |n: usize| {
+            let alone = (0..groups.len()).map(|k| {
+                let is_shown = k == 0 || k == n;
+                if is_shown {
+                    groups[k].clone()
+                } else {
+                    Vec::new()
+                }
+            });
+            let (method, setting) = &self.groups[n];
+            let name = match setting.as_deref().unwrap_or_default() {
+                "" => shown_method(method),
+                setting => format!("{}, {setting}", shown_method(method)),
+            };
+            (format!("{title}: {name}"), alone.collect())
+        };
+        there.into_iter().map(beside_first).collect()
+    }
+
     /// Over a panel: its task, and the setting where the task has several.
     fn title(&self, panel: &Shown) -> String {
         let is_of_task = |other: &&Shown| other.task == panel.task;
@@ -121,11 +149,13 @@ fn make(request: &Request) -> Result<String, FigureError> {
     let panel = |shown: &Shown| {
         let alone = |(_, curve)| curve;
         let groups = plan.curves(shown)?.into_iter();
-        let groups = groups.map(|seeds| seeds.into_iter().map(alone).collect());
-        Ok((plan.title(shown), groups.collect()))
+        let groups: Vec<Vec<Curve>> = groups
+            .map(|seeds| seeds.into_iter().map(alone).collect())
+            .collect();
+        Ok(plan.apart(&plan.title(shown), groups))
     };
     let panels = plan.panels.iter().map(panel);
-    let panels = panels.collect::<Result<Vec<_>, FigureError>>()?;
+    let panels = panels.collect::<Result<Vec<_>, FigureError>>()?.concat();
     let title = format!("{} over {}, by method", axes.y.0, axes.x.0.to_lowercase());
     Ok(sheet.draw(&panels, &title))
 }
@@ -331,6 +361,26 @@ mod tests {
             "{csv}"
         );
         assert_eq!(csv.matches("seed 1,0,0").count(), 4, "each point once");
+    }
+
+    #[test]
+    fn more_methods_than_colours_have_a_panel_each_beside_the_first() {
+        let methods = [
+            "stair", "pebble", "uniform", "rune", "mrn", "rime", "qpa", "sac",
+        ];
+        let of = |methods: &[&str]| {
+            let rows = methods
+                .iter()
+                .map(|m| row(m, 1, 0, 0.0) + &row(m, 1, 1_000, 0.5));
+            draw(rows.collect()).unwrap()
+        };
+        let n_seeds = |svg: &str| svg.matches("stroke-width=\"0.8\"").count();
+        let together = of(&methods[..7]);
+        assert_eq!(n_seeds(&together), 7);
+        assert!(!together.contains("window-open: "));
+        let apart = of(&methods);
+        assert_eq!(n_seeds(&apart), 2 * 7, "each beside STAIR");
+        assert!(apart.contains("window-open: SAC") && !apart.contains("window-open: STAIR"));
     }
 
     #[test]

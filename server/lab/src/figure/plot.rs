@@ -12,5 +12,5 @@ mod svg;
 pub(crate) use layout::{Entry, Sheet};
 pub(crate) use panel::{Frame, Labels, Panel};
 pub(crate) use scale::Scale;
-pub(crate) use style::{INK, NAME, PAPER, SMALL, series, shade};
+pub(crate) use style::{INK, N_COLORS, NAME, PAPER, SMALL, series, shade};
 pub(crate) use svg::{Anchor, Font, Pen, Svg};

@@ -100,10 +100,13 @@ impl Series {
     }
 }
 
+/// Series that are told apart by their colour.
+pub(crate) const N_COLORS: usize = 7;
+
 /// The look of the n-th series: colours of Okabe and Ito (2008), without the yellow, which is
 /// too pale on paper. After seven they start over with other dashes and markers.
 pub(crate) fn series(n: usize) -> Series {
-    const LOOKS: [(&str, &str, Marker); 7] = [
+    const LOOKS: [(&str, &str, Marker); N_COLORS] = [
         ("#0072b2", "", Marker::Disc),
         ("#d55e00", "7 3", Marker::Square),
         ("#009e73", "2.5 2.5", Marker::Up),
