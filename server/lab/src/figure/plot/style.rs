@@ -104,7 +104,8 @@ impl Series {
 pub(crate) const N_COLORS: usize = 7;
 
 /// The look of the n-th series: colours of Okabe and Ito (2008), without the yellow, which is
-/// too pale on paper. After seven they start over with other dashes and markers.
+/// too pale on paper. After seven they start over with other dashes and markers, from the second
+/// on: what is beside the first series in a panel of two has another colour than it.
 pub(crate) fn series(n: usize) -> Series {
     const LOOKS: [(&str, &str, Marker); N_COLORS] = [
         ("#0072b2", "", Marker::Disc),
@@ -118,10 +119,10 @@ pub(crate) fn series(n: usize) -> Series {
     let round = n / LOOKS.len();
     let look = |ahead: usize| LOOKS[(n + ahead) % LOOKS.len()];
     Series {
-        color: look(0).0,
-        dash: look(round).1,
+        color: look(round).0,
+        dash: look(2 * round).1,
         thin_dash: if round == 0 { "" } else { "3 2" },
-        marker: look(2 * round).2,
+        marker: look(3 * round).2,
     }
 }
 
@@ -158,11 +159,14 @@ mod tests {
 
     #[test]
     fn seeds_of_two_series_of_one_colour_can_be_told_apart() {
-        for n in 0..7 {
-            let (first, again) = (series(n), series(n + 7));
-            assert_eq!(first.color, again.color);
-            assert_ne!(first.thin_dash, again.thin_dash, "{n}");
+        for n in 0..2 * N_COLORS {
+            let alike = (0..n).map(series).filter(|m| m.color == series(n).color);
+            let alike: Vec<Series> = alike.collect();
+            assert_eq!(alike.len(), n / N_COLORS, "{n}");
+            assert!(alike.iter().all(|m| m.thin_dash != series(n).thin_dash));
         }
+        let first = series(0).color;
+        assert!((1..2 * N_COLORS - 1).all(|n| series(n).color != first));
     }
 
     #[test]
