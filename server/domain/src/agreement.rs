@@ -12,6 +12,7 @@ mod proportion;
 mod ratings;
 mod special;
 mod strata;
+mod superiority;
 
 pub use bootstrap::Bootstrap;
 pub use center::{interquartile_mean, mean};
@@ -21,6 +22,7 @@ pub use kappa::cohens_kappa;
 pub use proportion::{Share, newcombe};
 pub use ratings::{Ratings, self_consistency};
 pub use strata::{Continuity, StratifiedTest, Stratum, cochran_mantel_haenszel};
+pub use superiority::probability_of_superiority;
 
 #[cfg(test)]
 mod tests {

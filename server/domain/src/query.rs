@@ -65,8 +65,16 @@ impl OfferedQuery {
     /// Whether the true stages of all four end states are equal; `None` where the task does
     /// not know its stages.
     pub fn is_same_stage(&self) -> Option<bool> {
-        let ends = |s: &SegmentRecord| Some((*s.stages.first()?, *s.stages.last()?));
-        let ((a, b), (c, d)) = (ends(&self.first)?, ends(&self.second)?);
-        Some(a == b && b == c && c == d)
+        is_same_stage(&self.first.stages, &self.second.stages)
     }
+}
+
+/// Whether two segments lie within one true stage: whether the stages of their four end states are
+/// equal. `None` where the task does not know its stages.
+///
+/// * `first`, `second` – true stage of each state of a segment, `[H]`
+pub fn is_same_stage(first: &[u8], second: &[u8]) -> Option<bool> {
+    let ends = |stages: &[u8]| Some((*stages.first()?, *stages.last()?));
+    let ((a, b), (c, d)) = (ends(first)?, ends(second)?);
+    Some(a == b && b == c && c == d)
 }

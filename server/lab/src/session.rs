@@ -1,8 +1,9 @@
 //! One round of asking: what was chosen, what replaces a skipped query, when it is complete.
 
+use domain::agreement::probability_of_superiority;
 use domain::answer::Preference;
 use domain::environment::TaskReward;
-use domain::query::{OfferedQuery, Query, QueryKey};
+use domain::query::{OfferedQuery, Query, QueryKey, is_same_stage};
 use domain::random::{Rng, Stream};
 use domain::sampler::{Beliefs, QuerySampler};
 use domain::teacher::{Judge as _, Oracle};
@@ -180,15 +181,9 @@ impl Session {
         replay: &Replay,
     ) -> SessionOffered {
         let chosen: Vec<Query> = self.planned.iter().map(Planned::query).collect();
-        let same_stage: Option<Vec<f32>> = self
-            .planned
-            .iter()
-            .map(|p| {
-                p.offer(replay)
-                    .is_same_stage()
-                    .map(|is_same| f32::from(u8::from(is_same)))
-            })
-            .collect();
+        let gaps = beliefs.stage_gap(candidates);
+        let of_chosen = are_same_stage(&chosen, replay);
+        let of_pool = are_same_stage(candidates, replay);
         SessionOffered {
             session: self.index,
             step,
@@ -196,13 +191,105 @@ impl Session {
             disagreement_chosen: mean(&beliefs.disagreement(&chosen)),
             disagreement_pool: mean(&beliefs.disagreement(candidates)),
             stage_gap_chosen: mean(&beliefs.stage_gap(&chosen)),
-            stage_gap_pool: mean(&beliefs.stage_gap(candidates)),
-            same_stage_chosen: same_stage.and_then(|s| mean(&s)),
+            stage_gap_pool: mean(&gaps),
+            same_stage_chosen: of_chosen.and_then(|are| share(&are)),
+            same_stage_pool: of_pool.as_deref().and_then(share),
+            stage_gap_auc: of_pool.and_then(|are| area_under_curve(&gaps, &are)),
         }
     }
+}
+
+/// Whether each query lies within one true stage; `None` where the task does not know its stages.
+fn are_same_stage(queries: &[Query], replay: &Replay) -> Option<Vec<bool>> {
+    let is = |q: &Query| is_same_stage(replay.stages(q.first), replay.stages(q.second));
+    queries.iter().map(is).collect()
+}
+
+/// How well gaps tell queries within a stage from the others; `None` without gaps.
+fn area_under_curve(gaps: &[f32], are_same_stage: &[bool]) -> Option<f64> {
+    let pairs = || gaps.iter().copied().zip(are_same_stage);
+    let of = |is_same| {
+        pairs()
+            .filter(move |(_, is)| **is == is_same)
+            .map(|(gap, _)| gap)
+    };
+    let (within, across): (Vec<f32>, Vec<f32>) = (of(true).collect(), of(false).collect());
+    probability_of_superiority(&within, &across)
+}
+
+fn share(are: &[bool]) -> Option<f64> {
+    mean(&are.iter().copied().map(f32::from).collect::<Vec<_>>())
 }
 
 fn mean(values: &[f32]) -> Option<f64> {
     let sum: f64 = values.iter().copied().map(f64::from).sum();
     (!values.is_empty()).then(|| sum / values.len() as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use domain::environment::EpisodeEnd;
+    use domain::episode::{EpisodeId, Segment};
+    use learn::replay::{NewStep, ReplayShape};
+
+    use super::*;
+
+    /// An episode of 12 steps; the state after step t is in stage t / 4, or in none that is known.
+    fn replay(knows_stages: bool) -> Replay {
+        let shape = ReplayShape {
+            observation: 1,
+            action: 1,
+            pose: 0,
+        };
+        let mut replay = Replay::new(shape, 1);
+        let stage = |t: u8| knows_stages.then_some(t / 4);
+        replay.begin_episode(0, 1, &[0.0], &[], stage(0));
+        for t in 0..12 {
+            let step = NewStep {
+                action: &[0.0],
+                learned_reward: 0.0,
+                task_reward: TaskReward(0.0),
+                success: false,
+                stage: stage(t),
+                end: (t == 11).then_some(EpisodeEnd::TimeLimit),
+                next_observation: &[0.0],
+                next_pose: &[],
+            };
+            replay.push(0, step);
+        }
+        replay
+    }
+
+    /// Segments of three steps that start at these.
+    fn query(first: u32, second: u32) -> Query {
+        let [first, second] = [first, second].map(|start| Segment {
+            episode: EpisodeId(0),
+            start,
+            len: 3,
+        });
+        Query { first, second }
+    }
+
+    #[test]
+    fn a_pair_is_of_one_stage_where_all_its_ends_are() {
+        let queries = [
+            query(0, 1), // both in the first stage
+            query(0, 2), // the second one leaves it
+            query(2, 3), // both go from the first to the second
+            query(0, 4), // each in one, but in two
+            query(8, 9),
+        ];
+        let are = are_same_stage(&queries, &replay(true));
+        assert_eq!(are, Some(vec![true, false, false, false, true]));
+        assert_eq!(are_same_stage(&queries, &replay(false)), None);
+    }
+
+    #[test]
+    fn gaps_tell_pairs_of_one_stage_from_others_or_they_do_not() {
+        let are = [true, false, true, false];
+        let told = |gaps: &[f32]| area_under_curve(gaps, &are);
+        assert_eq!(told(&[0.1, 0.4, 0.2, 0.3]), Some(1.0));
+        assert_eq!(told(&[0.1, 0.2, 0.4, 0.3]), Some(0.5));
+        assert_eq!(told(&[]), None); // a method without a gap
+    }
 }

@@ -4,6 +4,8 @@
 //! episode is a contiguous range of its lane, with one state more than it has steps, so that
 //! next observations need no copy. A MetaWorld step takes about 250 bytes.
 
+use std::ops::Range;
+
 use domain::environment::{EpisodeEnd, TaskReward};
 use domain::episode::{EpisodeId, Segment, SegmentRecord};
 
@@ -323,16 +325,7 @@ impl Replay {
     /// # Panics
     /// When the segment reaches beyond its episode.
     pub fn record(&self, segment: Segment) -> SegmentRecord {
-        let (lane, episode) = self.lane_of(segment.episode);
-        let (start, len) = (segment.start as usize, segment.len as usize);
-        assert!(
-            start + len <= episode.len as usize,
-            "a segment inside its episode"
-        );
-        let states = episode.first_state + start + 1..episode.first_state + start + 1 + len;
-        let steps = episode.first_step + start..episode.first_step + start + len;
-        let stages = &lane.stages[states.clone()];
-        let knows_stages = !stages.contains(&NO_STAGE);
+        let (lane, steps, states) = self.rows_of(segment);
         SegmentRecord {
             segment,
             poses: states
@@ -343,11 +336,22 @@ impl Replay {
                 .copied()
                 .map(TaskReward)
                 .collect(),
-            stages: if knows_stages {
-                stages.to_vec()
-            } else {
-                Vec::new()
-            },
+            stages: self.stages(segment).to_vec(),
+        }
+    }
+
+    /// True stage of the state after each step of a segment, `[H]`; empty where the task does not
+    /// know its stages.
+    ///
+    /// # Panics
+    /// When the segment reaches beyond its episode.
+    pub fn stages(&self, segment: Segment) -> &[u8] {
+        let (lane, _, states) = self.rows_of(segment);
+        let stages = &lane.stages[states];
+        if stages.contains(&NO_STAGE) {
+            &[]
+        } else {
+            stages
         }
     }
 
@@ -451,6 +455,19 @@ impl Replay {
     fn lane_of(&self, id: EpisodeId) -> (&Lane, &Episode) {
         let episode = &self.episodes[id.0 as usize];
         (&self.lanes[episode.lane as usize], episode)
+    }
+
+    /// Rows of a segment's steps, and of the states that they lead to.
+    fn rows_of(&self, segment: Segment) -> (&Lane, Range<usize>, Range<usize>) {
+        let (lane, episode) = self.lane_of(segment.episode);
+        let (start, len) = (segment.start as usize, segment.len as usize);
+        assert!(
+            start + len <= episode.len as usize,
+            "a segment inside its episode"
+        );
+        let steps = episode.first_step + start..episode.first_step + start + len;
+        let states = episode.first_state + start + 1..episode.first_state + start + 1 + len;
+        (lane, steps, states)
     }
 
     fn step_of(&self, id: EpisodeId, t: usize) -> (&Lane, usize) {

@@ -2,7 +2,7 @@
 
 use domain::answer::Which;
 use domain::episode::SegmentRecord;
-use domain::query::{OfferedQuery, QueryKey};
+use domain::query::{OfferedQuery, QueryKey, is_same_stage};
 use serde_json::json;
 use sqlx::Row as _;
 
@@ -243,8 +243,6 @@ impl Store {
                 .collect())
         };
         let (a, b): (Vec<u8>, Vec<u8>) = (first.try_get(4)?, second.try_get(4)?);
-        let ends = |s: &[u8]| Some((*s.first()?, *s.last()?));
-        let same_stage = ends(&a).zip(ends(&b)).map(|(a, b)| a.0 == a.1 && a == b);
         Ok(TaskRewards {
             run: RunId(first.try_get(0)?),
             key: QueryKey {
@@ -253,7 +251,7 @@ impl Store {
             },
             first: rewards(first)?,
             second: rewards(second)?,
-            same_stage,
+            same_stage: is_same_stage(&a, &b),
             typical_reward: first.try_get(5)?,
         })
     }

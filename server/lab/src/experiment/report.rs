@@ -14,8 +14,11 @@ use crate::figure::{self, Between, CurveRow, FigureError, Request, Source};
 use crate::message::SessionOffered;
 
 mod comparable;
+mod csv;
+mod group;
+mod markdown;
+mod numbers;
 mod score;
-mod table;
 
 pub use score::{Learned, Reached, Score, area, learned, reached, score};
 
@@ -94,15 +97,6 @@ pub enum ReportError {
     MixedRevisions(String),
 }
 
-/// Runs of one method in one setting under one teacher on one task.
-#[derive(Debug, Clone, PartialEq, Eq)]
-struct Group {
-    task: String,
-    method: String,
-    /// As tables and keys show it; with the teacher where it is not the oracle.
-    setting: String,
-}
-
 /// Runs that may be told together.
 struct Runs {
     runs: Vec<RunResult>,
@@ -135,8 +129,8 @@ pub fn make(files: &[RowFile], may_mix: bool) -> Result<Vec<Artifact>, ReportErr
     runs.sort_by_cached_key(|run| place(&run.key, &settings));
     let runs = Runs { runs, failed };
     let mut artifacts = vec![
-        Artifact::new("report.md", table::markdown(&runs)),
-        Artifact::new("scores.csv", table::csv(&runs)),
+        Artifact::new("report.md", markdown::report(&runs)),
+        Artifact::new("scores.csv", csv::scores(&runs)),
     ];
     for kind in [true, false] {
         let of_kind: Vec<&RunResult> = runs
@@ -298,16 +292,6 @@ fn stage_gaps(runs: &Runs) -> Result<Vec<Artifact>, FigureError> {
         }
     }
     Ok(artifacts)
-}
-
-impl Group {
-    fn of(key: &RunKey) -> Self {
-        Self {
-            task: key.task.clone(),
-            method: key.method.clone(),
-            setting: key.shown_setting(),
-        }
-    }
 }
 
 #[cfg(test)]

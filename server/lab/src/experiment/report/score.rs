@@ -3,7 +3,7 @@
 use domain::agreement::{Bootstrap, Estimate, mean};
 
 use crate::experiment::results::RunResult;
-use crate::message::Evaluation;
+use crate::message::{Evaluation, SessionOffered};
 
 /// Evaluations at the end of which the mean is a run's score.
 const N_LAST: usize = 10;
@@ -101,23 +101,32 @@ pub fn area(run: &RunResult) -> f64 {
 /// Share of chosen pairs within one true stage, mean over the sessions in which the method chose;
 /// `None` where the task has no stages or the method had no choice.
 pub(super) fn same_stage(run: &RunResult) -> Option<f64> {
-    mean_of(
-        run.sessions
-            .iter()
-            .filter(|s| s.session > 0)
-            .map(|s| s.same_stage_chosen),
-    )
+    mean_of(chosen_in(run).map(|s| s.same_stage_chosen))
+}
+
+/// The same of all candidates; `None` also in rows of before it stood in them.
+pub(super) fn same_stage_of_candidates(run: &RunResult) -> Option<f64> {
+    mean_of(chosen_in(run).map(|s| s.same_stage_pool))
 }
 
 /// Stage gap of chosen pairs by that of all candidates, mean over the same sessions.
 pub(super) fn gap_ratio(run: &RunResult) -> Option<f64> {
-    let chosen = run.sessions.iter().filter(|s| s.session > 0);
-    mean_of(
-        chosen.map(|s| match (s.stage_gap_chosen, s.stage_gap_pool) {
-            (Some(chosen), Some(pool)) if pool > 0.0 => Some(chosen / pool),
-            _ => None,
-        }),
-    )
+    let ratio = |s: &SessionOffered| match (s.stage_gap_chosen, s.stage_gap_pool) {
+        (Some(chosen), Some(pool)) if pool > 0.0 => Some(chosen / pool),
+        _ => None,
+    };
+    mean_of(chosen_in(run).map(ratio))
+}
+
+/// How well the stage gap tells candidates within a true stage from the others, mean over the same
+/// sessions.
+pub(super) fn gap_auc(run: &RunResult) -> Option<f64> {
+    mean_of(chosen_in(run).map(|s| s.stage_gap_auc))
+}
+
+/// Sessions in which the method chose: all but the first, which is random.
+fn chosen_in(run: &RunResult) -> impl Iterator<Item = &SessionOffered> {
+    run.sessions.iter().filter(|s| s.session > 0)
 }
 
 /// Share of answers that the task reward gives too, mean over sessions; `None` where no session

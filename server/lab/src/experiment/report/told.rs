@@ -66,6 +66,8 @@ impl Told {
             stage_gap_chosen: Some(1.0),
             stage_gap_pool: Some(4.0),
             same_stage_chosen: Some(self.same_stage),
+            same_stage_pool: Some(0.5),
+            stage_gap_auc: Some(0.875),
         })];
         contents.push(Content::Answered(SessionClosed {
             session: 1,

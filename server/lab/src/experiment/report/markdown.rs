@@ -1,64 +1,23 @@
-//! The numbers of a report: Markdown for people, CSV for programs.
+//! The numbers of a report for people.
 
-use domain::agreement::{Bootstrap, Estimate, interquartile_mean, mean};
+use domain::agreement::{Bootstrap, interquartile_mean, mean};
 
 use super::comparable::{counted, revisions};
+use super::group::{Group, groups, members};
+use super::numbers::{SHARES, center, estimate, number, told_of};
 use super::score::{
-    Learned, Reached, area, gap_ratio, learned, oracle_agreement, reached, same_stage, score,
+    Learned, Reached, area, gap_auc, gap_ratio, learned, oracle_agreement, reached, same_stage,
+    same_stage_of_candidates, score,
 };
-use super::{Group, RunResult, Runs};
-use crate::figure::LEAST_FOR_INTERVAL;
-use crate::method::METHODS;
+use super::{RunResult, Runs};
 
 /// Pairs of seeds from which on a difference may be called one. With fewer, differences of pure
 /// chance have one sign in more than one case of twenty (2 · ½ⁿ), and an interval drawn from
 /// them leaves 0 out then.
 const LEAST_TO_BE_SURE: usize = 6;
-/// Shares of success of which the tables say when they were reached.
-const SHARES: [f64; 3] = [0.5, 0.8, 0.95];
-
-/// The groups of a report: tasks in order of their runs, in each the settings in theirs, in each
-/// the methods in the registry's order.
-fn groups(runs: &Runs) -> Vec<Group> {
-    let (mut tasks, mut settings, mut groups) = (Vec::new(), Vec::new(), Vec::new());
-    for run in &runs.runs {
-        let group = Group::of(&run.key);
-        if !tasks.contains(&group.task) {
-            tasks.push(group.task.clone());
-        }
-        if !settings.contains(&group.setting) {
-            settings.push(group.setting.clone());
-        }
-        if !groups.contains(&group) {
-            groups.push(group);
-        }
-    }
-    let place = |list: &[String], name: &str| list.iter().position(|known| known == name);
-    let rank = |method: &str| METHODS.iter().position(|m| m.name == method);
-    groups.sort_by_key(|group| {
-        let method = rank(&group.method).unwrap_or(METHODS.len());
-        (
-            place(&tasks, &group.task),
-            place(&settings, &group.setting),
-            method,
-        )
-    });
-    groups
-}
-
-/// The runs of a group by seed.
-fn members<'a>(runs: &'a Runs, group: &Group) -> Vec<&'a RunResult> {
-    let mut members: Vec<&RunResult> = runs
-        .runs
-        .iter()
-        .filter(|run| Group::of(&run.key) == *group)
-        .collect();
-    members.sort_by_key(|run| run.key.seed);
-    members
-}
 
 /// The whole report as Markdown.
-pub(super) fn markdown(runs: &Runs) -> String {
+pub(super) fn report(runs: &Runs) -> String {
     let mut text = String::from(
         "# Report\n\nA run's score is the mean of its last ten evaluations, each of the same held-out episodes. \
          Over seeds: interquartile mean, from three seeds on with its 95 % bootstrap interval. Area: mean height of the curve. \
@@ -270,25 +229,26 @@ fn alignment(text: &mut String, runs: &Runs, groups: &[&Group]) {
         let of = |f: fn(&RunResult) -> Option<f64>| -> Vec<f64> {
             members.iter().filter_map(|run| f(run)).collect()
         };
-        let (same, ratio) = (of(same_stage), of(gap_ratio));
-        if same.is_empty() && ratio.is_empty() {
+        let columns = [same_stage, same_stage_of_candidates, gap_ratio, gap_auc].map(of);
+        if columns.iter().all(Vec::is_empty) {
             continue;
         }
         add(
             &mut lines,
             format!(
-                "| {} | {} | {} | {} |\n",
+                "| {} | {} | {} |\n",
                 group.method,
                 or_dash(&group.setting),
-                center(&same, true),
-                center(&ratio, true)
+                columns.map(|values| center(&values, true)).join(" | ")
             ),
         );
     }
     if !lines.is_empty() {
         text.push_str(
-            "\nSessions in which the method chose:\n\n\
-             | method | setting | pairs in one true stage | stage gap, chosen by candidates |\n|---|---|---|---|\n",
+            "\nSessions in which the method chose, mean over a run's. The last column is the probability that of two \
+             candidates, one in one true stage and one not, the former has the smaller stage gap: at ½ the gap says nothing of stages.\n\n\
+             | method | setting | chosen pairs in one true stage | candidates in one | stage gap, chosen by candidates | stages told by the gap |\n\
+             |---|---|---|---|---|---|\n",
         );
         text.push_str(&lines);
     }
@@ -410,80 +370,6 @@ fn origin(text: &mut String, runs: &Runs) {
             }
         ),
     );
-}
-
-/// Every run in a line.
-pub(super) fn csv(runs: &Runs) -> String {
-    let mut text = String::from(
-        "task,method,teacher,setting,seed,score,area,labels,total_steps,same_stage,gap_ratio,oracle_agreement,\
-         labels_to_50,steps_to_50,labels_to_80,steps_to_80,labels_to_95,steps_to_95,revision,settings,wall_s\n",
-    );
-    for group in groups(runs) {
-        for run in members(runs, &group) {
-            let key = &run.key;
-            let optional = |value: Option<f64>| value.map_or_else(String::new, |v| v.to_string());
-            add(
-                &mut text,
-                format!(
-                    "{},{},{},\"{}\",{},{},{},{},{},{},{},{}",
-                    key.task,
-                    key.method,
-                    key.teacher,
-                    key.setting.replace('"', "\"\""),
-                    key.seed,
-                    score(run).value,
-                    area(run),
-                    run.end.labels,
-                    run.end.total_steps,
-                    optional(same_stage(run)),
-                    optional(gap_ratio(run)),
-                    optional(oracle_agreement(run))
-                ),
-            );
-            for share in SHARES {
-                let when = reached(run, share).filter(|_| run.end.has_success);
-                let told = when.map_or_else(|| ",".into(), |r| format!("{},{}", r.labels, r.step));
-                add(&mut text, format!(",{told}"));
-            }
-            let end = &run.end;
-            add(
-                &mut text,
-                format!(",{},{},{:.0}\n", end.revision, end.settings, end.wall_s),
-            );
-        }
-    }
-    text
-}
-
-fn center(values: &[f64], is_rate: bool) -> String {
-    let found = Bootstrap::default().center(values, interquartile_mean);
-    found.map_or_else(
-        || "–".into(),
-        |found| told_of(values.len(), &found, is_rate),
-    )
-}
-
-/// With its interval where there are seeds enough for one.
-fn told_of(n_seeds: usize, found: &Estimate, is_rate: bool) -> String {
-    if n_seeds < LEAST_FOR_INTERVAL {
-        number(found.value, is_rate)
-    } else {
-        estimate(found, is_rate)
-    }
-}
-
-fn estimate(found: &Estimate, is_rate: bool) -> String {
-    let told = |value| number(value, is_rate);
-    let (lo, hi) = (told(found.interval.lo), told(found.interval.hi));
-    format!("{} [{lo}, {hi}]", told(found.value))
-}
-
-fn number(value: f64, is_rate: bool) -> String {
-    if is_rate {
-        format!("{value:.2}")
-    } else {
-        format!("{value:.0}")
-    }
 }
 
 fn or_dash(text: &str) -> &str {
