@@ -282,7 +282,7 @@ fn results_that_do_not_go_together_are_named() {
     let here = folder.path();
     let shipped = concat!(
         env!("CARGO_MANIFEST_DIR"),
-        "/../../assets/results/go-fetch-return-80/results.jsonl"
+        "/../../assets/results/go-fetch-return-world-axes/80-answers/results.jsonl"
     );
     let rows = std::fs::read_to_string(shipped).expect("rows that come with the program");
     let of_a_kind = |keep: &dyn Fn(&serde_json::Value) -> bool,

@@ -224,11 +224,11 @@ mod tests {
         let mut lines = vec![r#"{"spec":{}}"#, RESET];
         lines.extend([STEP; 100]);
         let answers = answers(&lines);
-        assert_eq!(answers[0]["observation_size"], 17);
+        assert_eq!(answers[0]["observation_size"], 16);
         assert_eq!(answers[0]["action_size"], 3);
         assert_eq!(answers[1].as_object().map(serde_json::Map::len), Some(1));
         for (index, answer) in answers[2..].iter().enumerate() {
-            assert_eq!(answer["observation"].as_array().map(Vec::len), Some(17));
+            assert_eq!(answer["observation"].as_array().map(Vec::len), Some(16));
             assert!(answer["task_reward"].is_f64() && answer["success"].is_boolean());
             let end = if index == 99 {
                 json!("time_limit")

@@ -26,7 +26,7 @@ const SPEED_LAG_S: f32 = 0.1;
 /// Hardest push of the drive, newtons: a wall stops it.
 const PUSH: f32 = 40.0;
 /// Turning towards the commanded direction at full drive, radians per second.
-const TOP_TURN: f32 = 8.0;
+pub const TOP_TURN: f32 = 8.0;
 /// Time constant of the turning rate, seconds.
 const TURN_LAG_S: f32 = 0.05;
 /// Largest change of the jaws' openness in one control step.

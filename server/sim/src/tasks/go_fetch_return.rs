@@ -26,23 +26,25 @@
 //! | index | content | unit |
 //! |---|---|---|
 //! | 0–1 | velocity of the robot | 1 m/s |
-//! | 2–3 | n | – |
-//! | 4 | 2 o − 1 | – |
-//! | 5 | 1 while the object is held, else −1 | – |
-//! | 6–7 | b − j | 1.2 m |
-//! | 8–9 | the same from close by: b − j, cut to ±1 | 0.25 m |
-//! | 10 | how near the object is: 1 − ‖b − j‖/2 m, not below 0 | – |
-//! | 11–15 | 6–10 for g − b instead of b − j; zeros while the goal is out of sight | as above |
-//! | 16 | 1 while the object is at the goal, else −1 | – |
+//! | 2 | its turning rate, counter-clockwise | 8 rad/s |
+//! | 3 | 2 o − 1 | – |
+//! | 4 | 1 while the object is held, else −1 | – |
+//! | 5–6 | b − j | 1.2 m |
+//! | 7–8 | the same from close by: b − j, cut to ±1 | 0.25 m |
+//! | 9 | how near the object is: 1 − ‖b − j‖/2 m, not below 0 | – |
+//! | 10–14 | 5–9 for g − b instead of b − j; zeros while the goal is out of sight | as above |
+//! | 15 | 1 while the object is at the goal, else −1 | – |
 //!
-//! The goal is **in sight** while the object is held or at the goal. Nothing in a state tells one
-//! episode from another, so the states of a stage look alike wherever things lie, and a distance
-//! learned between states measures progress, not which episode they come from.
+//! Vectors are as the robot sees them: ahead, along n, then to its left. The goal is **in sight**
+//! while the object is held or at the goal. So the states of a stage look alike wherever things lie
+//! and whichever way the robot drives, and a distance learned between states measures progress. In
+//! the world's axes it would measure the way of driving: nothing leads from an episode that drives
+//! north to one that drives east, however alike their stages are.
 //!
 //! # Action
 //! | index | content |
 //! |---|---|
-//! | 0–1 | wanted velocity in world axes; 1 is 1 m/s; cut to the unit disc |
+//! | 0–1 | wanted velocity, ahead and to the left; 1 is 1 m/s; cut to the unit disc |
 //! | 2 | a: wanted openness of the jaws, (1 − a)/2; +1 closed, −1 open |
 //!
 //! # Reward
@@ -94,7 +96,7 @@ pub const TASK: Task = Task {
 const NAME: &str = "go-fetch-return";
 const EPISODE_LEN: u32 = 100;
 const CONTROL_PERIOD_S: f32 = 0.05;
-const OBSERVATION_SIZE: usize = 17;
+const OBSERVATION_SIZE: usize = 16;
 const ACTION_SIZE: usize = 3;
 const POSE_SIZE: usize = 9;
 
@@ -236,12 +238,14 @@ impl State {
     /// One control step; says whether the physics is still one of finite numbers.
     #[must_use = "a world that left the finite numbers must end its episode"]
     fn advance(&mut self, action: [f32; ACTION_SIZE]) -> bool {
-        let [drive_x, drive_y, jaws] = action;
+        let [ahead, left, jaws] = action;
         let pull = if self.is_held { self.grip() } else { [0.0; 2] };
         let object = &mut self.world.physics.bodies[self.object];
         object.reset_forces(true);
         object.add_force(Vector::new(-pull[0], -pull[1], 0.0), true);
-        self.robot.drive(&mut self.world, [drive_x, drive_y], pull);
+        let nose = self.robot.state(&self.world).heading;
+        let drive = view::turned([ahead, left], nose);
+        self.robot.drive(&mut self.world, drive, pull);
         let is_finite = self.world.step();
         self.move_jaws(jaws);
         is_finite
@@ -356,9 +360,9 @@ fn build_object(world: &mut World, position: [f32; 2]) -> RigidBodyHandle {
 
 /// Drives straight at the object with open jaws, closes them on it, drives straight to the goal.
 fn expert(observation: &[f32]) -> Vec<f32> {
-    let is_held = observation[5] > 0.0;
-    let to_object = [observation[6] * FLOOR_HALF, observation[7] * FLOOR_HALF];
-    let to_goal = [observation[11] * FLOOR_HALF, observation[12] * FLOOR_HALF];
+    let is_held = observation[4] > 0.0;
+    let to_object = [observation[5] * FLOOR_HALF, observation[6] * FLOOR_HALF];
+    let to_goal = [observation[10] * FLOOR_HALF, observation[11] * FLOOR_HALF];
     let way = if is_held { to_goal } else { to_object };
     let is_between = norm(to_object) <= JAW_ZONE;
     let jaws = if is_held || is_between { 1.0 } else { -1.0 };

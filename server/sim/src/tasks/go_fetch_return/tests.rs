@@ -30,6 +30,13 @@ fn view(to_object: f32, openness: f32, is_held: bool, to_goal: f32) -> View {
     }
 }
 
+/// A step in a direction of the world's axes.
+fn drive(environment: &mut GoFetchReturn, way: [f32; 2], jaws: f32) {
+    let nose = environment.state.view().robot.heading;
+    let [ahead, left] = view::turned_back(way, nose);
+    environment.step(&[ahead, left, jaws]).expect("valid");
+}
+
 /// An episode of the expert up to the first step at which the object is held.
 fn holding(seed: u64) -> GoFetchReturn {
     let mut environment = GoFetchReturn::new();
@@ -140,12 +147,12 @@ fn a_held_object_comes_along_and_a_dropped_one_stays() {
     let goal = start.object_to_goal;
     let away = [-goal[0] / norm(goal), -goal[1] / norm(goal)];
     for _ in 0..15 {
-        environment.step(&[-away[0], -away[1], 0.0]).expect("valid");
+        drive(&mut environment, [-away[0], -away[1]], 0.0);
     }
     let carried = environment.state.view();
     assert!(carried.is_held && norm(carried.object_to_goal) < norm(goal) - 0.2);
     for _ in 0..15 {
-        environment.step(&[away[0], away[1], -1.0]).expect("valid");
+        drive(&mut environment, away, -1.0);
     }
     let dropped = environment.state.view();
     assert!(!dropped.is_held && norm(dropped.jaws_to_object) > 0.1);
@@ -154,17 +161,54 @@ fn a_held_object_comes_along_and_a_dropped_one_stays() {
 #[test]
 fn a_robot_that_runs_against_the_walls_stays_inside() {
     let mut environment = GoFetchReturn::new();
-    for (seed, drive) in [[1.0, 0.0], [-1.0, 0.3], [0.1, 1.0], [1.0, -1.0]]
+    for (seed, way) in [[1.0, 0.0], [-1.0, 0.3], [0.1, 1.0], [1.0, -1.0]]
         .into_iter()
         .enumerate()
     {
         environment.reset(seed as u64);
         for _ in 0..EPISODE_LEN {
-            environment.step(&[drive[0], drive[1], 1.0]).expect("valid");
+            drive(&mut environment, way, 1.0);
         }
         let [x, y] = environment.state.view().robot.position;
         assert!(x.abs() < FLOOR_HALF && y.abs() < FLOOR_HALF, "{x} {y}");
     }
+}
+
+#[test]
+fn a_state_is_the_same_wherever_and_whichever_way_the_robot_stands() {
+    let quarter = |v: [f32; 2]| [-v[1], v[0]];
+    let here = View {
+        robot: PlanarState {
+            position: [0.3, -0.2],
+            velocity: [0.4, 0.1],
+            heading: [0.6, 0.8],
+            turn_rate: 2.0,
+        },
+        openness: 0.7,
+        is_held: true,
+        jaws_to_object: [0.1, 0.2],
+        object_to_goal: [-0.5, 0.3],
+    };
+    let there = View {
+        robot: PlanarState {
+            position: [0.1, 0.7],
+            velocity: quarter(here.robot.velocity),
+            heading: quarter(here.robot.heading),
+            ..here.robot
+        },
+        jaws_to_object: quarter(here.jaws_to_object),
+        object_to_goal: quarter(here.object_to_goal),
+        ..here
+    };
+    let (seen, again) = (here.observation(), there.observation());
+    assert_eq!(seen.len(), OBSERVATION_SIZE);
+    let close = |a: &[f32], b: &[f32]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-6);
+    assert!(close(&seen, &again), "{seen:?} {again:?}");
+    // ahead 0.4 · 0.6 + 0.1 · 0.8, to the left 0.1 · 0.6 − 0.4 · 0.8, a quarter of 8 rad/s
+    assert!(
+        close(&seen[..5], &[0.32, -0.26, 0.25, 0.4, 1.0]),
+        "{seen:?}"
+    );
 }
 
 #[test]

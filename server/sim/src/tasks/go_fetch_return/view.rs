@@ -4,7 +4,7 @@
 use domain::environment::TaskReward;
 
 use super::{CLOSE_UP, FAR, FETCH_DISTANCE, FLOOR_HALF, GOAL_RADIUS, HELD_OPENNESS, JAW_ZONE};
-use crate::robots::planar_robot::{PlanarState, TOP_SPEED};
+use crate::robots::planar_robot::{PlanarState, TOP_SPEED, TOP_TURN};
 
 /// What reward, success, stage and observation depend on.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,19 +20,19 @@ pub(super) struct View {
 
 impl View {
     pub(super) fn observation(&self) -> Vec<f32> {
-        let (velocity, heading) = (self.robot.velocity, self.robot.heading);
+        let seen = |v| turned_back(v, self.robot.heading);
+        let velocity = seen(self.robot.velocity);
         let sees_goal = self.is_held || self.is_success();
         let mut observation = vec![
             velocity[0] / TOP_SPEED,
             velocity[1] / TOP_SPEED,
-            heading[0],
-            heading[1],
+            self.robot.turn_rate / TOP_TURN,
             2.0 * self.openness - 1.0,
             sign(self.is_held),
         ];
-        observation.extend(way(self.jaws_to_object));
+        observation.extend(way(seen(self.jaws_to_object)));
         observation.extend(if sees_goal {
-            way(self.object_to_goal)
+            way(seen(self.object_to_goal))
         } else {
             [0.0; WAY_SIZE]
         });
@@ -90,6 +90,21 @@ fn way([x, y]: [f32; 2]) -> [f32; WAY_SIZE] {
 
 fn sign(is_true: bool) -> f32 {
     if is_true { 1.0 } else { -1.0 }
+}
+
+/// A vector of a robot's axes, ahead and to its left, in those of the world.
+///
+/// * `nose` – unit vector of the robot's nose
+pub(super) fn turned([ahead, left]: [f32; 2], nose: [f32; 2]) -> [f32; 2] {
+    [
+        ahead * nose[0] - left * nose[1],
+        ahead * nose[1] + left * nose[0],
+    ]
+}
+
+/// A vector of the world's axes in a robot's: the inverse of [`turned`].
+pub(super) fn turned_back(vector: [f32; 2], nose: [f32; 2]) -> [f32; 2] {
+    turned(vector, [nose[0], -nose[1]])
 }
 
 /// Length.
