@@ -61,12 +61,6 @@ impl OfferedQuery {
             second: self.second.segment,
         }
     }
-
-    /// Whether the true stages of all four end states are equal; `None` where the task does
-    /// not know its stages.
-    pub fn is_same_stage(&self) -> Option<bool> {
-        is_same_stage(&self.first.stages, &self.second.stages)
-    }
 }
 
 /// Whether two segments lie within one true stage: whether the stages of their four end states are

@@ -125,12 +125,14 @@ pub struct SessionOffered {
     pub stage_gap_pool: Option<f64>,
     /// Share of chosen queries whose four end states are in one true stage.
     pub same_stage_chosen: Option<f64>,
-    /// The same share of all candidates. `None` also in rows of before it stood in them.
+    /// The same share of all candidates. `None` where the task does not know its stages, and in rows
+    /// of before it stood in them.
     #[serde(default)]
     pub same_stage_pool: Option<f64>,
     /// Probability that of two candidates, one within a true stage and one not, the former has the
     /// smaller stage gap, ties half: 1 where the gap tells them apart, ½ where it says nothing.
-    /// `None` also in rows of before it stood in them.
+    /// `None` without stages or gaps, where all candidates are of one kind, and in rows of before it
+    /// stood in them.
     #[serde(default)]
     pub stage_gap_auc: Option<f64>,
 }

@@ -167,9 +167,9 @@ impl Session {
                 return None;
             };
             let right = Oracle.judge(&planned.offer(replay))?;
-            (right != Preference::Equal).then_some(f32::from(u8::from(own == right)))
+            (right != Preference::Equal).then_some(own == right)
         };
-        mean(&self.planned.iter().filter_map(agrees).collect::<Vec<_>>())
+        share(&self.planned.iter().filter_map(agrees).collect::<Vec<_>>())
     }
 
     /// What choosing did: the chosen queries against all candidates.
@@ -205,7 +205,8 @@ fn are_same_stage(queries: &[Query], replay: &Replay) -> Option<Vec<bool>> {
     queries.iter().map(is).collect()
 }
 
-/// How well gaps tell queries within a stage from the others; `None` without gaps.
+/// How well gaps tell queries within a stage from the others; `None` without gaps, and where all
+/// queries are of one kind.
 fn area_under_curve(gaps: &[f32], are_same_stage: &[bool]) -> Option<f64> {
     let pairs = || gaps.iter().copied().zip(are_same_stage);
     let of = |is_same| {
@@ -214,7 +215,7 @@ fn area_under_curve(gaps: &[f32], are_same_stage: &[bool]) -> Option<f64> {
             .map(|(gap, _)| gap)
     };
     let (within, across): (Vec<f32>, Vec<f32>) = (of(true).collect(), of(false).collect());
-    probability_of_superiority(&within, &across)
+    probability_of_superiority(&across, &within)
 }
 
 fn share(are: &[bool]) -> Option<f64> {

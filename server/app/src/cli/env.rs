@@ -199,7 +199,7 @@ mod tests {
 
     use super::*;
 
-    /// The answers to `lines` on go-fetch-return: 14 numbers observed, 3 acted.
+    /// The answers to `lines` on go-fetch-return: 16 numbers observed, 3 acted.
     fn answers(lines: &[&str]) -> Vec<Value> {
         let task = find_task("go-fetch-return").expect("a listed task");
         let mut said = Vec::new();

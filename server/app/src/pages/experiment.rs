@@ -44,7 +44,7 @@ struct RunLine {
     name: String,
     step: u64,
     total_steps: u64,
-    /// `12,000 of 54,000 steps`
+    /// `12,000 of 48,000 steps`
     words: String,
 }
 

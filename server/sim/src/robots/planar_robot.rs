@@ -18,6 +18,8 @@ pub const RADIUS: f32 = 0.16;
 pub const REACH: f32 = 0.25;
 /// Fastest drive, metres per second.
 pub const TOP_SPEED: f32 = 1.0;
+/// Fastest turn, towards where it is told to drive, radians per second.
+pub const TOP_TURN: f32 = 8.0;
 
 /// Kilograms.
 const MASS: f32 = 4.0;
@@ -25,8 +27,6 @@ const MASS: f32 = 4.0;
 const SPEED_LAG_S: f32 = 0.1;
 /// Hardest push of the drive, newtons: a wall stops it.
 const PUSH: f32 = 40.0;
-/// Turning towards the commanded direction at full drive, radians per second.
-pub const TOP_TURN: f32 = 8.0;
 /// Time constant of the turning rate, seconds.
 const TURN_LAG_S: f32 = 0.05;
 /// Largest change of the jaws' openness in one control step.
@@ -47,13 +47,25 @@ pub struct PlanarState {
     pub position: [f32; 2],
     /// Metres per second, world axes.
     pub velocity: [f32; 2],
-    /// Unit vector of the nose.
+    /// Unit vector of the nose, world axes.
     pub heading: [f32; 2],
     /// Radians per second, counter-clockwise.
     pub turn_rate: f32,
 }
 
 impl PlanarState {
+    /// A vector of the robot's own axes, ahead and to its left, in those of the world.
+    pub fn to_world(&self, [ahead, left]: [f32; 2]) -> [f32; 2] {
+        let [x, y] = self.heading;
+        [ahead * x - left * y, ahead * y + left * x]
+    }
+
+    /// A vector of the world's axes in the robot's own: the inverse of [`Self::to_world`].
+    pub fn to_own(&self, [x, y]: [f32; 2]) -> [f32; 2] {
+        let [c, s] = self.heading;
+        [x * c + y * s, y * c - x * s]
+    }
+
     /// The point between the jaws, metres.
     pub fn jaw_point(&self) -> [f32; 2] {
         [

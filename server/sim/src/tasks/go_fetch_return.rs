@@ -243,8 +243,7 @@ impl State {
         let object = &mut self.world.physics.bodies[self.object];
         object.reset_forces(true);
         object.add_force(Vector::new(-pull[0], -pull[1], 0.0), true);
-        let nose = self.robot.state(&self.world).heading;
-        let drive = view::turned([ahead, left], nose);
+        let drive = self.robot.state(&self.world).to_world([ahead, left]);
         self.robot.drive(&mut self.world, drive, pull);
         let is_finite = self.world.step();
         self.move_jaws(jaws);

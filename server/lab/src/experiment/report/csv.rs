@@ -2,10 +2,9 @@
 
 use super::Runs;
 use super::group::{groups, members};
-use super::numbers::SHARES;
+use super::numbers::{SHARES, add};
 use super::score::{
-    area, gap_auc, gap_ratio, oracle_agreement, reached, same_stage, same_stage_of_candidates,
-    score,
+    area, gap_auc, gap_ratio, oracle_agreement, reached, same_stage, same_stage_pool, score,
 };
 
 /// Every run in a line.
@@ -32,7 +31,7 @@ pub(super) fn scores(runs: &Runs) -> String {
                     run.end.labels,
                     run.end.total_steps,
                     optional(same_stage(run)),
-                    optional(same_stage_of_candidates(run)),
+                    optional(same_stage_pool(run)),
                     optional(gap_ratio(run)),
                     optional(gap_auc(run)),
                     optional(oracle_agreement(run))
@@ -51,8 +50,4 @@ pub(super) fn scores(runs: &Runs) -> String {
         }
     }
     text
-}
-
-fn add(text: &mut String, more: impl AsRef<str>) {
-    text.push_str(more.as_ref());
 }

@@ -4,10 +4,10 @@ use domain::agreement::{Bootstrap, interquartile_mean, mean};
 
 use super::comparable::{counted, revisions};
 use super::group::{Group, groups, members};
-use super::numbers::{SHARES, center, estimate, number, told_of};
+use super::numbers::{SHARES, add, center, estimate, number, told_of};
 use super::score::{
     Learned, Reached, area, gap_auc, gap_ratio, learned, oracle_agreement, reached, same_stage,
-    same_stage_of_candidates, score,
+    same_stage_pool, score,
 };
 use super::{RunResult, Runs};
 
@@ -221,7 +221,7 @@ fn learning(text: &mut String, runs: &Runs, groups: &[&Group]) {
     }
 }
 
-/// How far chosen pairs lie within a stage.
+/// How far chosen pairs and candidates lie within a stage, and what the stage gap knows of it.
 fn alignment(text: &mut String, runs: &Runs, groups: &[&Group]) {
     let mut lines = String::new();
     for group in groups {
@@ -229,7 +229,7 @@ fn alignment(text: &mut String, runs: &Runs, groups: &[&Group]) {
         let of = |f: fn(&RunResult) -> Option<f64>| -> Vec<f64> {
             members.iter().filter_map(|run| f(run)).collect()
         };
-        let columns = [same_stage, same_stage_of_candidates, gap_ratio, gap_auc].map(of);
+        let columns = [same_stage, same_stage_pool, gap_ratio, gap_auc].map(of);
         if columns.iter().all(Vec::is_empty) {
             continue;
         }
@@ -245,7 +245,7 @@ fn alignment(text: &mut String, runs: &Runs, groups: &[&Group]) {
     }
     if !lines.is_empty() {
         text.push_str(
-            "\nSessions in which the method chose, mean over a run's. The last column is the probability that of two \
+            "\nMean over the sessions of a run in which its method chose. The last column is the probability that of two \
              candidates, one in one true stage and one not, the former has the smaller stage gap: at ½ the gap says nothing of stages.\n\n\
              | method | setting | chosen pairs in one true stage | candidates in one | stage gap, chosen by candidates | stages told by the gap |\n\
              |---|---|---|---|---|---|\n",
@@ -374,8 +374,4 @@ fn origin(text: &mut String, runs: &Runs) {
 
 fn or_dash(text: &str) -> &str {
     if text.is_empty() { "–" } else { text }
-}
-
-fn add(text: &mut String, more: impl AsRef<str>) {
-    text.push_str(more.as_ref());
 }

@@ -1,4 +1,4 @@
-//! How the numbers of a report are written.
+//! How a report is written.
 
 use domain::agreement::{Bootstrap, Estimate, interquartile_mean};
 
@@ -37,4 +37,8 @@ pub(super) fn number(value: f64, is_rate: bool) -> String {
     } else {
         format!("{value:.0}")
     }
+}
+
+pub(super) fn add(text: &mut String, more: impl AsRef<str>) {
+    text.push_str(more.as_ref());
 }

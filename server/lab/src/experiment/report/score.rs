@@ -105,7 +105,7 @@ pub(super) fn same_stage(run: &RunResult) -> Option<f64> {
 }
 
 /// The same of all candidates; `None` also in rows of before it stood in them.
-pub(super) fn same_stage_of_candidates(run: &RunResult) -> Option<f64> {
+pub(super) fn same_stage_pool(run: &RunResult) -> Option<f64> {
     mean_of(chosen_in(run).map(|s| s.same_stage_pool))
 }
 

@@ -32,8 +32,7 @@ fn view(to_object: f32, openness: f32, is_held: bool, to_goal: f32) -> View {
 
 /// A step in a direction of the world's axes.
 fn drive(environment: &mut GoFetchReturn, way: [f32; 2], jaws: f32) {
-    let nose = environment.state.view().robot.heading;
-    let [ahead, left] = view::turned_back(way, nose);
+    let [ahead, left] = environment.state.view().robot.to_own(way);
     environment.step(&[ahead, left, jaws]).expect("valid");
 }
 

@@ -12,15 +12,15 @@ pub(super) struct View {
     pub(super) robot: PlanarState,
     pub(super) openness: f32,
     pub(super) is_held: bool,
-    /// b − j, metres.
+    /// b − j, metres, world axes.
     pub(super) jaws_to_object: [f32; 2],
-    /// g − b, metres.
+    /// g − b, metres, world axes.
     pub(super) object_to_goal: [f32; 2],
 }
 
 impl View {
     pub(super) fn observation(&self) -> Vec<f32> {
-        let seen = |v| turned_back(v, self.robot.heading);
+        let seen = |v| self.robot.to_own(v);
         let velocity = seen(self.robot.velocity);
         let sees_goal = self.is_held || self.is_success();
         let mut observation = vec![
@@ -90,21 +90,6 @@ fn way([x, y]: [f32; 2]) -> [f32; WAY_SIZE] {
 
 fn sign(is_true: bool) -> f32 {
     if is_true { 1.0 } else { -1.0 }
-}
-
-/// A vector of a robot's axes, ahead and to its left, in those of the world.
-///
-/// * `nose` – unit vector of the robot's nose
-pub(super) fn turned([ahead, left]: [f32; 2], nose: [f32; 2]) -> [f32; 2] {
-    [
-        ahead * nose[0] - left * nose[1],
-        ahead * nose[1] + left * nose[0],
-    ]
-}
-
-/// A vector of the world's axes in a robot's: the inverse of [`turned`].
-pub(super) fn turned_back(vector: [f32; 2], nose: [f32; 2]) -> [f32; 2] {
-    turned(vector, [nose[0], -nose[1]])
 }
 
 /// Length.
