@@ -175,7 +175,7 @@ impl RunFolder {
         last: Option<PathBuf>,
         read: impl Fn(&Path) -> Result<T, RunError>,
     ) -> Result<T, RunError> {
-        let mut reasons = Vec::new();
+        let mut reasons: Vec<String> = Vec::new();
         let checkpoints = self.checkpoints()?.into_iter().rev();
         let checkpoints = checkpoints.map(|step| self.checkpoint_path(step));
         for path in checkpoints.chain(last) {
@@ -184,6 +184,7 @@ impl RunFolder {
                 Err(error) => reasons.push(error.to_string()),
             }
         }
+        reasons.dedup(); // where one thing is wrong with all
         let reasons = if reasons.is_empty() {
             "there is none".into()
         } else {

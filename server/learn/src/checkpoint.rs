@@ -82,7 +82,7 @@ impl Archive {
             Section::F32 { shape: found, .. } => Err(LearnError::section(
                 name,
                 format!(
-                    "it holds {found:?} numbers where {shape:?} are needed: another network or task"
+                    "it holds {found:?} numbers where {shape:?} are needed: another network, another task, or a task whose states have changed since"
                 ),
             )),
             _ => Err(LearnError::section(name, "it holds no f32 numbers")),

@@ -37,9 +37,9 @@
 //!
 //! Vectors are as the robot sees them: ahead, along n, then to its left. The goal is **in sight**
 //! while the object is held or at the goal. So the states of a stage look alike wherever things lie
-//! and whichever way the robot drives, and a distance learned between states measures progress. In
-//! the world's axes it would measure the way of driving: nothing leads from an episode that drives
-//! north to one that drives east, however alike their stages are.
+//! and whichever way the robot drives, so that a distance learned between states can measure progress.
+//! In the world's axes no state of an episode that drives north leads to one that drives east, however
+//! alike their stages are, and a learned distance told nothing of stages (`assets/results`).
 //!
 //! # Action
 //! | index | content |
