@@ -66,10 +66,14 @@ impl Browser {
         self.client.goto(url).await.expect("the page loads");
     }
 
-    /// Presses one key, as a person does: again when nothing on the page could take it yet.
+    /// Presses one key, as a person does: once the page has put the focus where it wants it, which
+    /// it does a little after it is there, and again when nothing on it could take the key yet.
     pub(crate) async fn press(&self, key: &str) {
+        let has_focus = "document.activeElement !== document.body || \
+            ![...document.querySelectorAll('[autofocus]')].some((e) => e.checkVisibility())";
         let mut refused = None;
         for _ in 0..20 {
+            self.until(has_focus).await;
             let focused = self.client.active_element().await;
             let focused = focused.expect("something has the focus");
             match focused.send_keys(key).await {

@@ -135,6 +135,16 @@ pub struct SessionOffered {
     /// stood in them.
     #[serde(default)]
     pub stage_gap_auc: Option<f64>,
+    /// Mean stage gap of the chosen queries, mean of both directions. The paper's runs from the first
+    /// segment to the second. `None` without gaps and in rows of before it stood in them.
+    #[serde(default)]
+    pub symmetric_gap_chosen: Option<f64>,
+    /// The same of all candidates.
+    #[serde(default)]
+    pub symmetric_gap_pool: Option<f64>,
+    /// As [`Self::stage_gap_auc`], with the gap of both directions.
+    #[serde(default)]
+    pub symmetric_gap_auc: Option<f64>,
 }
 
 /// What a session's answers did to the reward.

@@ -18,6 +18,7 @@ mod stair;
 mod stair_isr;
 mod surf;
 mod timestep;
+mod true_stage;
 mod uniform;
 
 /// What makes one method differ from another.
@@ -125,6 +126,11 @@ pub const METHODS: &[MethodEntry] = &[
         name: "timestep",
         summary: "STAIR with the step of the episode for a stage",
         build: timestep::timestep,
+    },
+    MethodEntry {
+        name: "true_stage",
+        summary: "STAIR told the true stages: the upper bound of aligning",
+        build: true_stage::true_stage,
     },
     MethodEntry {
         name: "sac",

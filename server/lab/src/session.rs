@@ -182,6 +182,7 @@ impl Session {
     ) -> SessionOffered {
         let chosen: Vec<Query> = self.planned.iter().map(Planned::query).collect();
         let gaps = beliefs.stage_gap(candidates);
+        let symmetric_gaps = symmetric_gap(candidates, beliefs);
         let of_chosen = are_same_stage(&chosen, replay);
         let of_pool = are_same_stage(candidates, replay);
         SessionOffered {
@@ -194,9 +195,26 @@ impl Session {
             stage_gap_pool: mean(&gaps),
             same_stage_chosen: of_chosen.and_then(|are| share(&are)),
             same_stage_pool: of_pool.as_deref().and_then(share),
-            stage_gap_auc: of_pool.and_then(|are| area_under_curve(&gaps, &are)),
+            stage_gap_auc: of_pool
+                .as_deref()
+                .and_then(|are| area_under_curve(&gaps, are)),
+            symmetric_gap_chosen: mean(&symmetric_gap(&chosen, beliefs)),
+            symmetric_gap_pool: mean(&symmetric_gaps),
+            symmetric_gap_auc: of_pool.and_then(|are| area_under_curve(&symmetric_gaps, &are)),
         }
     }
+}
+
+/// Mean stage gap of both directions, `[N]`; empty for methods without a notion of stages.
+fn symmetric_gap(queries: &[Query], beliefs: &mut dyn Beliefs) -> Vec<f32> {
+    let swapped = queries.iter().map(|q| Query {
+        first: q.second,
+        second: q.first,
+    });
+    let back = beliefs.stage_gap(&swapped.collect::<Vec<_>>());
+    let there = beliefs.stage_gap(queries);
+    let both = there.iter().zip(&back);
+    both.map(|(a, b)| f32::midpoint(*a, *b)).collect()
 }
 
 /// Whether each query lies within one true stage; `None` where the task does not know its stages.

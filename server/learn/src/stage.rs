@@ -21,21 +21,33 @@ pub enum StageApproximator {
     Intervals,
     /// A state's stage is its step in its episode; segments are intervals of steps.
     Timestep,
+    /// A state's stage is what the task itself says, and a distance how many stages apart two
+    /// states are: Eq. 8 without anything learned, so 0 within a true stage alone.
+    True,
 }
 
 impl StageApproximator {
     /// Whether somebody has to learn a temporal distance for it.
     pub fn needs_temporal_distance(self) -> bool {
-        self != Self::Timestep
+        !matches!(self, Self::Timestep | Self::True)
     }
 
-    /// Whether its gaps are shares of an interval, in [0, 1], rather than nats.
-    pub fn is_of_intervals(self) -> bool {
-        matches!(self, Self::Intervals | Self::Timestep)
+    /// Whether the task has to know its stages.
+    pub fn needs_true_stages(self) -> bool {
+        self == Self::True
     }
 
-    /// Gap of each query, `[N]`; nats for the quadrilaterals, [0, 1] for intervals. Empty
-    /// without the temporal distance that it needs.
+    /// What its gaps are told in.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::Quadrilateral | Self::SymmetricQuadrilateral => "nats",
+            Self::Intervals | Self::Timestep => "share of an interval",
+            Self::True => "stages",
+        }
+    }
+
+    /// Gap of each query, `[N]`, in its [unit](Self::unit). Empty without the temporal distance or
+    /// the true stages that it needs.
     ///
     /// # Panics
     /// When a segment is not in the replay.
@@ -67,9 +79,24 @@ impl StageApproximator {
                 };
                 queries.iter().map(gap).collect()
             }
+            (Self::True, _) => {
+                let gap = |q: &Query| true_gap(replay.stages(q.first), replay.stages(q.second));
+                queries.iter().map_while(gap).collect()
+            }
             (_, None) => Vec::new(),
         }
     }
+}
+
+/// Mean number of stages between either end of one segment and either end of the other; `None`
+/// where the task does not know its stages.
+///
+/// * `first`, `second` – true stage of each state of a segment, `[H]`
+fn true_gap(first: &[u8], second: &[u8]) -> Option<f32> {
+    let ends = |stages: &[u8]| Some([*stages.first()?, *stages.last()?]);
+    let (first, second) = (ends(first)?, ends(second)?);
+    let apart = |a: u8| second.map(|b| f32::from(a.abs_diff(b))).iter().sum::<f32>();
+    Some(first.map(apart).iter().sum::<f32>() / 4.0)
 }
 
 fn swapped(query: Query) -> Query {
@@ -168,6 +195,18 @@ mod tests {
             assert!((gap - 0.5 * (1.0 - index)).abs() < 1e-6, "{gap} {apart}");
         }
         assert!(gaps.is_sorted());
+    }
+
+    #[test]
+    fn the_true_gap_counts_stages_between_the_ends_and_is_0_within_a_stage_alone() {
+        let gap = |a: &[u8], b: &[u8]| true_gap(a, b).unwrap();
+        assert_eq!(gap(&[1, 1, 1], &[1, 1, 1]), 0.0);
+        assert_eq!(gap(&[0, 0, 0], &[2, 2, 2]), 2.0);
+        assert_eq!(gap(&[0, 1, 1], &[0, 0, 1]), 0.5); // both go from one to the next
+        assert_eq!(gap(&[0, 0, 1], &[0, 0, 0]), 0.5);
+        assert_eq!(gap(&[2, 2, 2], &[0, 0, 1]), gap(&[0, 0, 1], &[2, 2, 2]));
+        let unknown = StageApproximator::True.gap(&replay(), None, &[query((0, 3), (1, 3), 5)]);
+        assert!(unknown.is_empty());
     }
 
     #[test]

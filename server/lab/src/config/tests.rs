@@ -21,10 +21,22 @@ fn every_preset_resolves_for_every_task_and_method() {
                     presets,
                     ..Layers::default()
                 };
-                RunConfig::resolve(&layers).unwrap();
+                let is_known = method.name != "true_stage" || task.name == "go-fetch-return";
+                assert_eq!(RunConfig::resolve(&layers).is_ok(), is_known);
             }
         }
     }
+}
+
+#[test]
+fn a_task_that_does_not_know_its_stages_cannot_tell_them() {
+    let layers = Layers {
+        task: Some("window-open".into()),
+        method: Some("true_stage".into()),
+        ..Layers::default()
+    };
+    let error = RunConfig::resolve(&layers).unwrap_err().to_string();
+    assert!(error.contains("does not know its stages"), "{error}");
 }
 
 /// ALGORITHMS.md 7: answers in all and in a session, steps between sessions, the first session.

@@ -183,9 +183,6 @@ impl StageGaps {
 fn unit(method: &str) -> &'static str {
     let recipe = method::find(method).map(|entry| (entry.build)(&RunConfig::default()));
     let stage = recipe.ok().and_then(|recipe| recipe.stage);
-    if stage.is_some_and(StageApproximator::is_of_intervals) {
-        "share of an interval"
-    } else {
-        "nats" // the quadrilaterals, also as any method's sampler brings them along
-    }
+    // A sampler that asks for a gap brings the quadrilateral along.
+    stage.map_or("nats", StageApproximator::unit)
 }

@@ -125,6 +125,7 @@ learns! {
     surf_without_crops_learns_from_answers: "surf_whole", LATER;
     stair_isr_learns_from_answers: "stair_isr", &[];
     stair_by_timestep_learns_from_answers: "timestep", &[];
+    stair_told_the_stages_learns_from_answers: "true_stage", &[];
     sac_learns_from_the_task_reward: "sac", &[];
 }
 

@@ -5,12 +5,13 @@ use super::group::{groups, members};
 use super::numbers::{SHARES, add};
 use super::score::{
     area, gap_auc, gap_ratio, oracle_agreement, reached, same_stage, same_stage_pool, score,
+    symmetric_gap_auc, symmetric_gap_ratio,
 };
 
 /// Every run in a line.
 pub(super) fn scores(runs: &Runs) -> String {
     let mut text = String::from(
-        "task,method,teacher,setting,seed,score,area,labels,total_steps,same_stage,same_stage_pool,gap_ratio,gap_auc,oracle_agreement,\
+        "task,method,teacher,setting,seed,score,area,labels,total_steps,same_stage,same_stage_pool,gap_ratio,gap_auc,symmetric_gap_ratio,symmetric_gap_auc,oracle_agreement,\
          labels_to_50,steps_to_50,labels_to_80,steps_to_80,labels_to_95,steps_to_95,revision,settings,wall_s\n",
     );
     for group in groups(runs) {
@@ -20,7 +21,7 @@ pub(super) fn scores(runs: &Runs) -> String {
             add(
                 &mut text,
                 format!(
-                    "{},{},{},\"{}\",{},{},{},{},{},{},{},{},{},{}",
+                    "{},{},{},\"{}\",{},{},{},{},{},{},{},{},{},{},{},{}",
                     key.task,
                     key.method,
                     key.teacher,
@@ -34,6 +35,8 @@ pub(super) fn scores(runs: &Runs) -> String {
                     optional(same_stage_pool(run)),
                     optional(gap_ratio(run)),
                     optional(gap_auc(run)),
+                    optional(symmetric_gap_ratio(run)),
+                    optional(symmetric_gap_auc(run)),
                     optional(oracle_agreement(run))
                 ),
             );

@@ -7,7 +7,7 @@ use super::group::{Group, groups, members};
 use super::numbers::{SHARES, add, center, estimate, number, told_of};
 use super::score::{
     Learned, Reached, area, gap_auc, gap_ratio, learned, oracle_agreement, reached, same_stage,
-    same_stage_pool, score,
+    same_stage_pool, score, symmetric_gap_auc,
 };
 use super::{RunResult, Runs};
 
@@ -229,7 +229,14 @@ fn alignment(text: &mut String, runs: &Runs, groups: &[&Group]) {
         let of = |f: fn(&RunResult) -> Option<f64>| -> Vec<f64> {
             members.iter().filter_map(|run| f(run)).collect()
         };
-        let columns = [same_stage, same_stage_pool, gap_ratio, gap_auc].map(of);
+        let columns = [
+            same_stage,
+            same_stage_pool,
+            gap_ratio,
+            gap_auc,
+            symmetric_gap_auc,
+        ]
+        .map(of);
         if columns.iter().all(Vec::is_empty) {
             continue;
         }
@@ -245,10 +252,10 @@ fn alignment(text: &mut String, runs: &Runs, groups: &[&Group]) {
     }
     if !lines.is_empty() {
         text.push_str(
-            "\nMean over the sessions of a run in which its method chose. The last column is the probability that of two \
-             candidates, one in one true stage and one not, the former has the smaller stage gap: at ½ the gap says nothing of stages.\n\n\
-             | method | setting | chosen pairs in one true stage | candidates in one | stage gap, chosen by candidates | stages told by the gap |\n\
-             |---|---|---|---|---|---|\n",
+            "\nMean over the sessions of a run in which its method chose. The last columns are the probability that of two \
+             candidates, one in one true stage and one not, the former has the smaller stage gap, as the method measures it and as the mean of both directions: at ½ the gap says nothing of stages.\n\n\
+             | method | setting | chosen pairs in one true stage | candidates in one | stage gap, chosen by candidates | stages told by the gap | by both directions |\n\
+             |---|---|---|---|---|---|---|\n",
         );
         text.push_str(&lines);
     }

@@ -111,17 +111,27 @@ pub(super) fn same_stage_pool(run: &RunResult) -> Option<f64> {
 
 /// Stage gap of chosen pairs by that of all candidates, mean over the same sessions.
 pub(super) fn gap_ratio(run: &RunResult) -> Option<f64> {
-    let ratio = |s: &SessionOffered| match (s.stage_gap_chosen, s.stage_gap_pool) {
-        (Some(chosen), Some(pool)) if pool > 0.0 => Some(chosen / pool),
-        _ => None,
-    };
-    mean_of(chosen_in(run).map(ratio))
+    mean_of(chosen_in(run).map(|s| ratio(s.stage_gap_chosen, s.stage_gap_pool)))
+}
+
+/// The same with the gap of both directions; `None` also in rows of before it stood in them.
+pub(super) fn symmetric_gap_ratio(run: &RunResult) -> Option<f64> {
+    mean_of(chosen_in(run).map(|s| ratio(s.symmetric_gap_chosen, s.symmetric_gap_pool)))
+}
+
+fn ratio(chosen: Option<f64>, pool: Option<f64>) -> Option<f64> {
+    Some(chosen? / pool.filter(|pool| *pool > 0.0)?)
 }
 
 /// How well the stage gap tells candidates within a true stage from the others, mean over the same
 /// sessions.
 pub(super) fn gap_auc(run: &RunResult) -> Option<f64> {
     mean_of(chosen_in(run).map(|s| s.stage_gap_auc))
+}
+
+/// The same with the gap of both directions; `None` also in rows of before it stood in them.
+pub(super) fn symmetric_gap_auc(run: &RunResult) -> Option<f64> {
+    mean_of(chosen_in(run).map(|s| s.symmetric_gap_auc))
 }
 
 /// Sessions in which the method chose: all but the first, which is random.

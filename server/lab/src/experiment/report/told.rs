@@ -68,6 +68,9 @@ impl Told {
             same_stage_chosen: Some(self.same_stage),
             same_stage_pool: Some(0.5),
             stage_gap_auc: Some(0.875),
+            symmetric_gap_chosen: Some(1.0),
+            symmetric_gap_pool: Some(2.0),
+            symmetric_gap_auc: Some(0.625),
         })];
         contents.push(Content::Answered(SessionClosed {
             session: 1,
