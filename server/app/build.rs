@@ -1,7 +1,9 @@
 //! Link arguments for libtorch, the revision for `stair --version`, and the files of `web/static`
 //! and `assets/guidance` and the results of experiments inside the program.
 
+use std::collections::hash_map::DefaultHasher;
 use std::fmt::Write as _;
+use std::hash::{Hash as _, Hasher as _};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -17,25 +19,68 @@ fn main() {
     embed_results();
 }
 
-/// `STAIR_REVISION`: the short commit, `+` where the tree differs from it, `unknown` outside git.
+/// What a program is made of, from the top of the repository.
+const SOURCES: &[&str] = &[
+    "server",
+    "web",
+    "migrations",
+    "assets/presets",
+    "assets/experiments",
+    "assets/guidance",
+    "assets/shaders",
+    "assets/studies",
+    "Cargo.toml",
+    "Cargo.lock",
+];
+
+/// `STAIR_REVISION`: the short commit, with `+` and a hash of the changes where the sources differ
+/// from it, so that two programs of one revision are the same; `unknown` outside git.
 fn emit_revision() {
-    let git = |arguments: &[&str]| -> Option<String> {
-        let output = Command::new("git").args(arguments).output().ok()?;
-        output
-            .status
-            .success()
-            .then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
-    };
     if let Some(folder) = git(&["rev-parse", "--git-dir"]) {
         println!("cargo:rerun-if-changed={folder}/logs/HEAD");
     }
+    for source in SOURCES {
+        println!("cargo:rerun-if-changed=../../{source}");
+    }
     let revision = git(&["rev-parse", "--short=10", "HEAD"]).unwrap_or_else(|| "unknown".into());
-    let is_clean = git(&["status", "--porcelain", "--untracked-files=no"])
-        .is_none_or(|changes| changes.is_empty());
-    println!(
-        "cargo:rustc-env=STAIR_REVISION={revision}{}",
-        if is_clean { "" } else { "+" }
-    );
+    let changes = changes().map_or_else(String::new, |hash| format!("+{hash:08x}"));
+    println!("cargo:rustc-env=STAIR_REVISION={revision}{changes}");
+}
+
+/// Of everything in which the sources differ from the commit, files that it lacks included; `None`
+/// where nothing does.
+fn changes() -> Option<u32> {
+    let of_sources = |arguments: &[&str]| {
+        let sources: Vec<String> = SOURCES.iter().map(|s| format!(":/{s}")).collect();
+        let mut arguments = arguments.to_vec();
+        arguments.push("--");
+        arguments.extend(sources.iter().map(String::as_str));
+        git(&arguments).unwrap_or_default()
+    };
+    let changed = of_sources(&["diff", "HEAD"]);
+    let new = of_sources(&["ls-files", "--others", "--exclude-standard", "--full-name"]);
+    if changed.is_empty() && new.is_empty() {
+        return None;
+    }
+    let mut hasher = DefaultHasher::new();
+    changed.hash(&mut hasher);
+    for file in new.lines() {
+        file.hash(&mut hasher);
+        // One that is gone by now is told by its name alone.
+        std::fs::read(Path::new("../..").join(file))
+            .unwrap_or_default()
+            .hash(&mut hasher);
+    }
+    Some(hasher.finish() as u32)
+}
+
+/// What git says; `None` where it fails or is not there.
+fn git(arguments: &[&str]) -> Option<String> {
+    let output = Command::new("git").args(arguments).output().ok()?;
+    output
+        .status
+        .success()
+        .then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
 }
 
 /// Writes `static_files.rs`: `(path below web/static, bytes)` of every file, sorted by path.

@@ -209,7 +209,7 @@ fn rng(seed: u64, key: QueryKey) -> Rng {
 }
 
 /// Sum of a segment's task rewards.
-fn task_return(segment: &SegmentRecord) -> f64 {
+pub fn task_return(segment: &SegmentRecord) -> f64 {
     segment.task_rewards.iter().map(|r| r.0).sum()
 }
 

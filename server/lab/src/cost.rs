@@ -26,7 +26,11 @@ pub fn time_here(config: &RunConfig, spec: &EnvSpec) -> Duration {
 /// anything, so the temporal distance counts, and so do the trials.
 pub fn core_time_here(config: &RunConfig, spec: &EnvSpec) -> Duration {
     let trial = f64::from(config.evaluation.episodes) * f64::from(spec.episode_len);
-    let trials = 1 + config.training.total_steps / config.evaluation.every.max(1);
+    let periodic = config
+        .training
+        .total_steps
+        .checked_div(config.evaluation.every);
+    let trials = 1 + periodic.unwrap_or(0);
     let temporal = temporal_gigaflop(config, spec) / (SHARE * gigaflop_per_second());
     let beside = temporal + STEP_S * trial * trials as f64;
     time_here(config, spec) + Duration::from_secs_f64(beside)

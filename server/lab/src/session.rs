@@ -6,7 +6,7 @@ use domain::environment::TaskReward;
 use domain::query::{OfferedQuery, Query, QueryKey, is_same_stage};
 use domain::random::{Rng, Stream};
 use domain::sampler::{Beliefs, QuerySampler};
-use domain::teacher::{Judge as _, Oracle};
+use domain::teacher::{Judge as _, Oracle, task_return};
 use learn::replay::Replay;
 use serde::{Deserialize, Serialize};
 
@@ -166,8 +166,10 @@ impl Session {
             else {
                 return None;
             };
-            let right = Oracle.judge(&planned.offer(replay))?;
-            (right != Preference::Equal).then_some(own == right)
+            let offered = planned.offer(replay);
+            let difference = task_return(&offered.second) - task_return(&offered.first);
+            let right = Oracle.judge(&offered)?;
+            (difference.abs() > 0.0).then_some(own == right)
         };
         share(&self.planned.iter().filter_map(agrees).collect::<Vec<_>>())
     }
@@ -247,11 +249,13 @@ fn mean(values: &[f32]) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
+    use domain::answer::Which;
     use domain::environment::EpisodeEnd;
     use domain::episode::{EpisodeId, Segment};
     use learn::replay::{NewStep, ReplayShape};
 
     use super::*;
+    use crate::preferences::Asked;
 
     /// An episode of 12 steps; the state after step t is in stage t / 4, or in none that is known.
     fn replay(knows_stages: bool) -> Replay {
@@ -287,6 +291,33 @@ mod tests {
             len: 3,
         });
         Query { first, second }
+    }
+
+    /// The replay's task rewards are all 0, and scripted teachers have to name one all the same.
+    #[test]
+    fn answers_about_pairs_of_equal_task_reward_are_neither_right_nor_wrong() {
+        let planned = [0, 1].map(|index| Planned {
+            key: QueryKey { session: 0, index },
+            query: query(0, 4),
+            asks_same_stage: false,
+            disagreement: None,
+            stage_gap: None,
+            typical_reward: None,
+        });
+        let session = Session {
+            index: 0,
+            size: 2,
+            planned: planned.into(),
+            reserve: Vec::new(),
+        };
+        let answers = [Which::First, Which::Second];
+        let asked = session.planned.iter().zip(answers).map(|(p, which)| Asked {
+            key: p.key,
+            query: p.query,
+            state: AnswerState::Preferred(Preference::Prefer(which)),
+        });
+        let preferences = Preferences::from(asked.collect::<Vec<_>>());
+        assert_eq!(session.oracle_agreement(&preferences, &replay(true)), None);
     }
 
     #[test]

@@ -54,3 +54,54 @@ impl Beliefs for LearnedBeliefs<'_> {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use domain::episode::{EpisodeId, Segment};
+
+    use super::*;
+    use crate::device::Device;
+    use crate::replay::walked::walked;
+    use crate::reward::RewardConfig;
+
+    /// Coordinates count on from state to state and from one episode to the next.
+    #[test]
+    fn the_states_of_a_query_are_those_before_each_step_of_the_first_segment_and_of_the_second() {
+        let episode = |from: u8| -> Vec<Vec<f32>> {
+            let state = |t: u8| vec![f32::from(from + t), -1.0];
+            (0..=6).map(state).collect()
+        };
+        let replay = walked(2, [episode(0), episode(100)]);
+        let config = RewardConfig {
+            hidden: vec![4],
+            ..RewardConfig::default()
+        };
+        let segment = |episode, start| Segment {
+            episode: EpisodeId(episode),
+            start,
+            len: 3,
+        };
+        let query = Query {
+            first: segment(1, 0),
+            second: segment(0, 3),
+        };
+        let mut beliefs = LearnedBeliefs {
+            replay: &replay,
+            reward: &RewardEnsemble::new(&config, 2, 1, 1, Device::CPU),
+            temporal: None,
+            stage: None,
+            asked: &[query],
+        };
+        let coordinates = [100.0, 101.0, 102.0, 3.0, 4.0, 5.0];
+        let expected: Vec<f32> = coordinates.iter().flat_map(|&x| [x, -1.0]).collect();
+        assert_eq!(beliefs.asked_states(), [expected]);
+        assert_eq!(beliefs.states(&[query, query]).len(), 2);
+        assert!(
+            beliefs.stage_gap(&[query]).is_empty(),
+            "no notion of stages"
+        );
+        for doubt in [beliefs.disagreement(&[query]), beliefs.entropy(&[query])] {
+            assert!(doubt.len() == 1 && doubt[0] > 0.0, "{doubt:?}");
+        }
+    }
+}

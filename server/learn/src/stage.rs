@@ -199,12 +199,18 @@ mod tests {
 
     #[test]
     fn the_true_gap_counts_stages_between_the_ends_and_is_0_within_a_stage_alone() {
-        let gap = |a: &[u8], b: &[u8]| true_gap(a, b).unwrap();
-        assert_eq!(gap(&[1, 1, 1], &[1, 1, 1]), 0.0);
-        assert_eq!(gap(&[0, 0, 0], &[2, 2, 2]), 2.0);
-        assert_eq!(gap(&[0, 1, 1], &[0, 0, 1]), 0.5); // both go from one to the next
-        assert_eq!(gap(&[0, 0, 1], &[0, 0, 0]), 0.5);
-        assert_eq!(gap(&[2, 2, 2], &[0, 0, 1]), gap(&[0, 0, 1], &[2, 2, 2]));
+        let is = |a: &[u8], b: &[u8], expected: f32| {
+            let gaps = [true_gap(a, b).unwrap(), true_gap(b, a).unwrap()];
+            assert!(
+                gaps.iter().all(|gap| (gap - expected).abs() < 1e-6),
+                "{gaps:?}"
+            );
+        };
+        is(&[1, 1, 1], &[1, 1, 1], 0.0);
+        is(&[0, 0, 0], &[2, 2, 2], 2.0);
+        is(&[0, 1, 1], &[0, 0, 1], 0.5); // both go from one to the next
+        is(&[0, 0, 1], &[0, 0, 0], 0.5);
+        is(&[2, 2, 2], &[0, 0, 1], 1.5);
         let unknown = StageApproximator::True.gap(&replay(), None, &[query((0, 3), (1, 3), 5)]);
         assert!(unknown.is_empty());
     }

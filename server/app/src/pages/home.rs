@@ -243,7 +243,10 @@ fn methods() -> Vec<Choice> {
         words: format!("{}: {}", method_name(method.name), choosing(method)),
         is_default: method.name == "stair",
     };
-    lab::method::METHODS.iter().map(choice).collect()
+    // A task that does not know its stages cannot tell them, and most do not.
+    let is_for_all = |method: &&lab::method::MethodEntry| method.name != "true_stage";
+    let for_all = lab::method::METHODS.iter().filter(is_for_all);
+    for_all.map(choice).collect()
 }
 
 /// How a method chooses its queries, short enough for a small phone.

@@ -98,6 +98,18 @@ mod tests {
         assert_eq!(rank(&u, &d), rank(&u, &stretched));
     }
 
+    /// Candidates of a wide gap with doubt, a narrow one with half of it, and in the middle: the
+    /// paper's other coefficients let the gap weigh more.
+    #[test]
+    fn coefficients_decide_between_a_wide_gap_in_doubt_and_a_narrow_one_in_less() {
+        let rank = |stage, state| {
+            let c = StageCoefficients { stage, state };
+            descending(&stage_aligned_score(&[1.0, 0.5, 0.0], &[0.8, 0.0, 1.0], c))
+        };
+        assert_eq!(rank(2.0, 0.1), [0, 1, 2]); // 1.2 · 1.1, 2 · 0.6, 1 · 0.1
+        assert_eq!(rank(1.0, 0.5), [1, 0, 2]); // 0.2 · 1.5, 1 · 1, 0
+    }
+
     #[test]
     fn no_candidates_no_scores() {
         assert!(stage_aligned_score(&[], &[], StageCoefficients::default()).is_empty());

@@ -177,9 +177,46 @@ fn rune_pays_for_disagreement_less_and_less_and_others_do_not() {
 #[test]
 fn rime_keeps_its_critics_and_centres_novelty() {
     let rime = Trained::new("rime", &[]);
-    let config = &rime.run.config;
-    assert!(!config.training.reset_critic);
-    assert_eq!(config.exploration.novelty, Novelty::Centred);
+    assert_eq!(rime.run.learner.n_critic_resets(), 0);
+    assert_eq!(rime.run.config.exploration.novelty, Novelty::Centred);
+    let pebble = Trained::new("pebble", &[]);
+    assert_eq!(pebble.run.learner.n_critic_resets(), 1);
+}
+
+/// Before any answer, so nothing but novelty can have taught it.
+#[test]
+fn rimes_rewards_begin_with_novelty_and_no_others_do() {
+    let rewards = |method, more: &[&str]| {
+        let more = [&["training.total_steps=250"], more].concat();
+        let trained = Trained::new(method, &more);
+        let replay = &trained.run.replay;
+        let state = replay.observation(replay.complete_episodes()[0], 5);
+        trained.run.learner.reward.predict(state, &[0.1, 0.2, 0.3])
+    };
+    let untaught = rewards("rime", &["denoising.warm_start_steps=0"]);
+    assert_ne!(untaught, rewards("rime", &[]));
+    assert_eq!(untaught, rewards("pebble", &[]));
+}
+
+/// How often the temporal distance learns, and from how long blocks, each on its own; in the
+/// released code one number says both.
+#[test]
+fn steps_of_the_temporal_distance_and_its_blocks_are_set_apart() {
+    let n_steps = |every, block: u32| {
+        let more = [
+            format!("temporal.update_every={every}"),
+            format!("temporal.block_episodes={block}"),
+        ];
+        let trained = Trained::new("stair", &more.each_ref().map(String::as_str));
+        trained.run.learner.temporal.as_ref().unwrap().n_updates()
+    };
+    // From the first session on, at step 300, when three episodes of 100 steps are over.
+    assert_eq!(n_steps(10, 1), 40);
+    assert_eq!(n_steps(10, 3), 40);
+    assert_eq!(n_steps(20, 1), 20);
+    // Only from step 500 on there is a block to learn from.
+    assert_eq!(n_steps(10, 5), 20);
+    assert_eq!(n_steps(20, 5), 10);
 }
 
 #[test]

@@ -115,6 +115,7 @@ const LATER: &[&str] = &[
 ];
 
 learns! {
+    stair_learns_from_answers: "stair", &[];
     uniform_learns_from_answers: "uniform", LATER;
     pebble_learns_from_answers: "pebble", &[];
     rune_learns_from_answers: "rune", &[];

@@ -324,6 +324,52 @@ mod tests {
         assert_eq!(semi.cropped(&replay, query, &mut rng), query);
     }
 
+    /// The two parts of SURF act in a fit, each on its own. The order of drawing is the same with and
+    /// without either's effect, so where nothing is sure and nothing cropped the bits are equal.
+    #[test]
+    fn sure_pairs_and_crops_move_a_fit_and_unsure_pairs_do_not() {
+        let replay = replay(12);
+        let labeled = labeled(&replay, 24, |_| 10);
+        let unlabeled = queries(&replay, 60);
+        let config = RewardConfig {
+            learning_rate: 3e-3,
+            ..small()
+        };
+        let predictions = |certainty, weight, is_cropping| {
+            let mut ensemble = RewardEnsemble::new(&config, 3, 2, 1, Device::CPU);
+            let mut semi = semi(&SemiSupervisedConfig {
+                certainty,
+                weight,
+                is_cropping,
+                passes: 4,
+                ..SemiSupervisedConfig::default()
+            });
+            let lesson = Lesson {
+                replay: &replay,
+                labeled: &labeled,
+                unlabeled: &unlabeled,
+            };
+            semi.fit(&mut ensemble, &lesson);
+            let bits = |p: f32| p.to_bits();
+            let predicted = ensemble.probabilities(&replay, &unlabeled);
+            predicted
+                .into_iter()
+                .flatten()
+                .map(bits)
+                .collect::<Vec<_>>()
+        };
+        let (sure, never) = (0.5, 1.0 - 1e-15);
+        let answers_alone = predictions(never, 1.0, false);
+        assert_eq!(
+            answers_alone,
+            predictions(never, 9.0, false),
+            "none was sure enough"
+        );
+        assert_ne!(answers_alone, predictions(sure, 1.0, false), "all were");
+        assert_ne!(predictions(sure, 1.0, false), predictions(sure, 9.0, false));
+        assert_ne!(answers_alone, predictions(never, 1.0, true), "cropped");
+    }
+
     /// ⌈20 · 40 / 16⌉ = 50 minibatches of 16, 16 and 8 of 40: sixteen rounds and two thirds.
     #[test]
     fn answers_are_passed_over_as_often_as_the_settings_say_and_resumed_bit_for_bit() {

@@ -176,11 +176,25 @@ fn every_shipped_grid_resolves_and_has_a_small_variant_of_the_same_kind() {
         let text = entry.source();
         let whole = resolve(text, false).unwrap_or_else(|e| panic!("{e}"));
         let small = resolve(text, true).unwrap_or_else(|e| panic!("{e}"));
-        let n_tasks = |grid: &Grid| {
-            let tasks: BTreeSet<&str> = grid.runs.iter().map(|r| r.key.task.as_str()).collect();
-            tasks.len()
+        let of_small = |name: fn(&RunKey) -> String| {
+            let names: BTreeSet<String> = small.runs.iter().map(|run| name(&run.key)).collect();
+            names.len()
         };
-        assert_eq!(n_tasks(&small), 1, "{}", entry.name);
+        let sizes = [
+            of_small(|key| key.task.clone()),
+            of_small(|key| key.method.clone()),
+            of_small(|key| key.seed.to_string()),
+        ];
+        assert_eq!(sizes, [1, 2, 2], "{}: tasks, methods, seeds", entry.name);
+        let has_success = |grid: &Grid| {
+            let specs = grid
+                .runs
+                .iter()
+                .map(|run| find_task(&run.key.task).unwrap());
+            specs.map(|task| (task.spec)().has_success).next()
+        };
+        // Success or return: the same axis in the same figure.
+        assert_eq!(has_success(&small), has_success(&whole), "{}", entry.name);
         assert!(
             small.runs.len() < whole.runs.len() && !whole.about.is_empty(),
             "{}",

@@ -202,14 +202,17 @@ fn terms(first: &RunResult, second: &RunResult) -> Result<(), ReportError> {
 }
 
 /// What methods have to share to be held against each other: the environment, how often they are
-/// updated, when and how much is asked, and how long the segments are. All else is as by default.
+/// updated, when, of whom, from how many and how much is asked, and how long the segments are. All
+/// else is as by default.
 fn only_terms(config: &RunConfig) -> RunConfig {
     let mut terms = RunConfig {
         environment: config.environment,
         feedback: config.feedback,
+        teacher: config.teacher,
         ..RunConfig::default()
     };
     terms.training.updates_per_step = config.training.updates_per_step;
     terms.queries.segment_len = config.queries.segment_len;
+    terms.queries.candidates_per_query = config.queries.candidates_per_query;
     terms
 }

@@ -329,7 +329,8 @@ fn over_all_tasks(text: &mut String, runs: &Runs, groups: &[Group]) {
             continue;
         }
         let found = Bootstrap::default().stratified(&strata, interquartile_mean);
-        let told = found.map_or_else(|| "–".into(), |found| estimate(&found, true));
+        let fewest = strata.iter().map(Vec::len).min().unwrap_or(0);
+        let told = found.map_or_else(|| "–".into(), |found| told_of(fewest, &found, true));
         add(
             text,
             format!(

@@ -189,7 +189,24 @@ fn methods_that_were_asked_otherwise_are_not_held_against_each_other() {
         told.contains("feedback.every") && told.contains("7777"),
         "{told}"
     );
-    make(&[file("a", stair + &with("sac", 0, &seldom))], false).unwrap();
+    make(
+        &[file("a", stair.clone() + &with("sac", 0, &seldom))],
+        false,
+    )
+    .unwrap();
+    let errs = |config: &mut RunConfig| config.teacher.mistake = 0.3;
+    let from_more = |config: &mut RunConfig| config.queries.candidates_per_query = 77;
+    for (key, pebble) in [
+        ("teacher.mistake", with("pebble", 80, &errs)),
+        (
+            "queries.candidates_per_query",
+            with("pebble", 80, &from_more),
+        ),
+    ] {
+        let rows = stair.clone() + &pebble;
+        let told = make(&[file("a", rows)], false).unwrap_err().to_string();
+        assert!(told.contains(key), "{told}");
+    }
 }
 
 #[test]
@@ -264,6 +281,13 @@ fn tasks_are_drawn_together_by_strata() {
     assert!(
         report.contains("## All 2 tasks") && report.contains("| stair | – | 0.50 [0.50, 0.50] |"),
         "{report}"
+    );
+    let one = STAIR.text() + &STAIR.text().replace("go-fetch-return", "window-open");
+    let report = &make(&[file("rows.jsonl", one)], false).unwrap()[0].text;
+    let (_, of_all) = report.split_once("## All 2 tasks").unwrap();
+    assert!(
+        of_all.contains("| stair | – | 0.50 |"),
+        "one seed has no interval:\n{report}"
     );
 }
 
