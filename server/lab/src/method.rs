@@ -47,6 +47,12 @@ impl Method {
             .is_some_and(StageApproximator::needs_temporal_distance)
     }
 
+    /// Whether only tasks that know their stages can have it.
+    pub fn needs_true_stages(&self) -> bool {
+        self.stage
+            .is_some_and(StageApproximator::needs_true_stages)
+    }
+
     /// The same method with another way of choosing; one that asks for a stage gap brings the
     /// paper's along where the method has none.
     #[must_use]

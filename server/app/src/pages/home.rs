@@ -244,7 +244,9 @@ fn methods() -> Vec<Choice> {
         is_default: method.name == "stair",
     };
     // A task that does not know its stages cannot tell them, and most do not.
-    let is_for_all = |method: &&lab::method::MethodEntry| method.name != "true_stage";
+    let settings = lab::config::RunConfig::default();
+    let is_for_all =
+        |entry: &&lab::method::MethodEntry| !(entry.build)(&settings).needs_true_stages();
     let for_all = lab::method::METHODS.iter().filter(is_for_all);
     for_all.map(choice).collect()
 }

@@ -4,8 +4,6 @@ use std::ops::RangeBounds;
 
 use domain::sampler::{SAMPLERS, sampler};
 
-use learn::stage::StageApproximator;
-
 use super::{ConfigError, RunConfig, find_task, unknown};
 use crate::method;
 
@@ -136,11 +134,8 @@ impl RunConfig {
             return Err(unknown("sampler", &q.sampler, known));
         }
         let spec = (find_task(&self.task)?.spec)();
-        let needs_true_stages = method::build(self)?
-            .stage
-            .is_some_and(StageApproximator::needs_true_stages);
         require(
-            !needs_true_stages || !spec.stages.is_empty(),
+            !spec.stages.is_empty() || !method::build(self)?.needs_true_stages(),
             "method",
             &self.method,
             "another one here: this task does not know its stages",
