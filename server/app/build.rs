@@ -19,22 +19,32 @@ fn main() {
     embed_results();
 }
 
-/// What a program is made of, from the top of the repository.
+/// What a program is made of, from the top of the repository. Results of experiments are in it too,
+/// to be looked at; they change nothing that it does.
 const SOURCES: &[&str] = &[
-    "server",
-    "web",
-    "migrations",
-    "assets/presets",
+    ".cargo/config.toml",
+    "Cargo.lock",
+    "Cargo.toml",
     "assets/experiments",
+    "assets/fonts",
     "assets/guidance",
+    "assets/presets",
     "assets/shaders",
     "assets/studies",
-    "Cargo.toml",
-    "Cargo.lock",
+    "migrations",
+    "server",
+    "web",
+];
+
+/// What lies among them and is no part of it.
+const OTHERS: &[&str] = &[
+    ":(top,exclude)server/lab/tests",
+    ":(top,exclude)server/xtask",
+    ":(top,exclude,glob)server/**/*.md",
 ];
 
 /// `STAIR_REVISION`: the short commit, with `+` and a hash of the changes where the sources differ
-/// from it, so that two programs of one revision are the same; `unknown` outside git.
+/// from it, so that other sources never have the same revision; `unknown` outside git.
 fn emit_revision() {
     if let Some(folder) = git(&["rev-parse", "--git-dir"]) {
         println!("cargo:rerun-if-changed={folder}/logs/HEAD");
@@ -42,36 +52,43 @@ fn emit_revision() {
     for source in SOURCES {
         println!("cargo:rerun-if-changed=../../{source}");
     }
-    let revision = git(&["rev-parse", "--short=10", "HEAD"]).unwrap_or_else(|| "unknown".into());
-    let changes = changes().map_or_else(String::new, |hash| format!("+{hash:08x}"));
-    println!("cargo:rustc-env=STAIR_REVISION={revision}{changes}");
+    let revision = git(&["rev-parse", "--short=10", "HEAD"])
+        .map_or_else(|| "unknown".into(), |commit| commit + &changes());
+    println!("cargo:rustc-env=STAIR_REVISION={revision}");
 }
 
-/// Of everything in which the sources differ from the commit, files that it lacks included; `None`
-/// where nothing does.
-fn changes() -> Option<u32> {
-    let of_sources = |arguments: &[&str]| {
+/// `+` and a hash of every file of the sources that differs from the commit or that it lacks, by name
+/// and content; nothing where none does.
+fn changes() -> String {
+    let listed = |arguments: &[&str]| -> Option<Vec<String>> {
         let sources: Vec<String> = SOURCES.iter().map(|s| format!(":/{s}")).collect();
-        let mut arguments = arguments.to_vec();
-        arguments.push("--");
-        arguments.extend(sources.iter().map(String::as_str));
-        git(&arguments).unwrap_or_default()
+        let mut arguments = [arguments, &["-z", "--"]].concat();
+        arguments.extend(
+            sources
+                .iter()
+                .map(String::as_str)
+                .chain(OTHERS.iter().copied()),
+        );
+        let names = git(&arguments)?;
+        let names = names.split('\0').filter(|name| !name.is_empty());
+        Some(names.map(str::to_owned).collect())
     };
-    let changed = of_sources(&["diff", "HEAD"]);
-    let new = of_sources(&["ls-files", "--others", "--exclude-standard", "--full-name"]);
-    if changed.is_empty() && new.is_empty() {
-        return None;
+    let changed = listed(&["diff", "--name-only", "--no-relative", "HEAD"]);
+    let new = listed(&["ls-files", "--others", "--exclude-standard", "--full-name"]);
+    let (Some(changed), Some(new)) = (changed, new) else {
+        return "+unknown".into();
+    };
+    let mut files = [changed, new].concat();
+    if files.is_empty() {
+        return String::new();
     }
+    files.sort();
     let mut hasher = DefaultHasher::new();
-    changed.hash(&mut hasher);
-    for file in new.lines() {
-        file.hash(&mut hasher);
-        // One that is gone by now is told by its name alone.
-        std::fs::read(Path::new("../..").join(file))
-            .unwrap_or_default()
-            .hash(&mut hasher);
+    for file in files {
+        let content = std::fs::read(Path::new("../..").join(&file)).ok(); // none: it was removed
+        (file, content).hash(&mut hasher);
     }
-    Some(hasher.finish() as u32)
+    format!("+{:08x}", hasher.finish() as u32)
 }
 
 /// What git says; `None` where it fails or is not there.

@@ -63,6 +63,17 @@ impl OfferedQuery {
     }
 }
 
+impl Query {
+    /// The same two segments, the second first.
+    #[must_use]
+    pub fn swapped(self) -> Self {
+        Self {
+            first: self.second,
+            second: self.first,
+        }
+    }
+}
+
 /// Whether two segments lie within one true stage: whether the stages of their four end states are
 /// equal. `None` where the task does not know its stages.
 ///

@@ -49,8 +49,7 @@ impl Method {
 
     /// Whether only tasks that know their stages can have it.
     pub fn needs_true_stages(&self) -> bool {
-        self.stage
-            .is_some_and(StageApproximator::needs_true_stages)
+        self.stage.is_some_and(StageApproximator::needs_true_stages)
     }
 
     /// The same method with another way of choosing; one that asks for a stage gap brings the
@@ -135,7 +134,7 @@ pub const METHODS: &[MethodEntry] = &[
     },
     MethodEntry {
         name: "true_stage",
-        summary: "STAIR told the true stages: the upper bound of aligning",
+        summary: "STAIR told the true stages, where the task knows them",
         build: true_stage::true_stage,
     },
     MethodEntry {

@@ -209,11 +209,8 @@ impl Session {
 
 /// Mean stage gap of both directions, `[N]`; empty for methods without a notion of stages.
 fn symmetric_gap(queries: &[Query], beliefs: &mut dyn Beliefs) -> Vec<f32> {
-    let swapped = queries.iter().map(|q| Query {
-        first: q.second,
-        second: q.first,
-    });
-    let back = beliefs.stage_gap(&swapped.collect::<Vec<_>>());
+    let swapped: Vec<Query> = queries.iter().map(|q| q.swapped()).collect();
+    let back = beliefs.stage_gap(&swapped);
     let there = beliefs.stage_gap(queries);
     let both = there.iter().zip(&back);
     both.map(|(a, b)| f32::midpoint(*a, *b)).collect()
@@ -296,20 +293,7 @@ mod tests {
     /// The replay's task rewards are all 0, and scripted teachers have to name one all the same.
     #[test]
     fn answers_about_pairs_of_equal_task_reward_are_neither_right_nor_wrong() {
-        let planned = [0, 1].map(|index| Planned {
-            key: QueryKey { session: 0, index },
-            query: query(0, 4),
-            asks_same_stage: false,
-            disagreement: None,
-            stage_gap: None,
-            typical_reward: None,
-        });
-        let session = Session {
-            index: 0,
-            size: 2,
-            planned: planned.into(),
-            reserve: Vec::new(),
-        };
+        let session = session([query(0, 4), query(0, 4)]);
         let answers = [Which::First, Which::Second];
         let asked = session.planned.iter().zip(answers).map(|(p, which)| Asked {
             key: p.key,
@@ -318,6 +302,24 @@ mod tests {
         });
         let preferences = Preferences::from(asked.collect::<Vec<_>>());
         assert_eq!(session.oracle_agreement(&preferences, &replay(true)), None);
+    }
+
+    fn session(queries: impl IntoIterator<Item = Query>) -> Session {
+        let planned = (0..).zip(queries).map(|(index, query)| Planned {
+            key: QueryKey { session: 0, index },
+            query,
+            asks_same_stage: false,
+            disagreement: None,
+            stage_gap: None,
+            typical_reward: None,
+        });
+        let planned: Vec<Planned> = planned.collect();
+        Session {
+            index: 0,
+            size: planned.len() as u32,
+            planned,
+            reserve: Vec::new(),
+        }
     }
 
     #[test]
@@ -332,6 +334,42 @@ mod tests {
         let are = are_same_stage(&queries, &replay(true));
         assert_eq!(are, Some(vec![true, false, false, false, true]));
         assert_eq!(are_same_stage(&queries, &replay(false)), None);
+    }
+
+    /// Sees how far back it is from the first segment to the second, and no way ahead.
+    struct OneWay;
+
+    impl Beliefs for OneWay {
+        fn disagreement(&mut self, candidates: &[Query]) -> Vec<f32> {
+            vec![0.0; candidates.len()]
+        }
+        fn entropy(&mut self, candidates: &[Query]) -> Vec<f32> {
+            vec![0.0; candidates.len()]
+        }
+        fn states(&mut self, candidates: &[Query]) -> Vec<Vec<f32>> {
+            vec![Vec::new(); candidates.len()]
+        }
+        fn asked_states(&mut self) -> Vec<Vec<f32>> {
+            Vec::new()
+        }
+        fn stage_gap(&mut self, candidates: &[Query]) -> Vec<f32> {
+            let back = |q: &Query| q.first.start.saturating_sub(q.second.start) as f32;
+            candidates.iter().map(back).collect()
+        }
+    }
+
+    #[test]
+    fn a_session_tells_the_gap_there_and_that_of_both_directions() {
+        // there 0, 4, 0 and 1; both ways ½, 2, 4 and ½; the first and the last in one stage
+        let candidates = [query(0, 1), query(4, 0), query(0, 8), query(9, 8)];
+        let session = session([candidates[2]]);
+        let told = session.report(0, &candidates, &mut OneWay, &replay(true));
+        let there = (told.stage_gap_chosen, told.stage_gap_pool);
+        assert_eq!(there, (Some(0.0), Some(1.25)));
+        let both = (told.symmetric_gap_chosen, told.symmetric_gap_pool);
+        assert_eq!(both, (Some(4.0), Some(1.75)));
+        let auc = (told.stage_gap_auc, told.symmetric_gap_auc);
+        assert_eq!(auc, (Some(0.625), Some(1.0)));
     }
 
     #[test]

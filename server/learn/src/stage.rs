@@ -66,7 +66,7 @@ impl StageApproximator {
             }
             (Self::Quadrilateral, Some(temporal)) => temporal.stage_gap(replay, queries),
             (Self::SymmetricQuadrilateral, Some(temporal)) => {
-                let swapped: Vec<Query> = queries.iter().copied().map(swapped).collect();
+                let swapped: Vec<Query> = queries.iter().map(|q| q.swapped()).collect();
                 let there = temporal.stage_gap(replay, queries);
                 let back = temporal.stage_gap(replay, &swapped);
                 let means = there.iter().zip(&back).map(|(a, b)| 0.5 * (a + b));
@@ -81,7 +81,8 @@ impl StageApproximator {
             }
             (Self::True, _) => {
                 let gap = |q: &Query| true_gap(replay.stages(q.first), replay.stages(q.second));
-                queries.iter().map_while(gap).collect()
+                let gaps: Option<Vec<f32>> = queries.iter().map(gap).collect();
+                gaps.unwrap_or_default()
             }
             (_, None) => Vec::new(),
         }
@@ -97,13 +98,6 @@ fn true_gap(first: &[u8], second: &[u8]) -> Option<f32> {
     let (first, second) = (ends(first)?, ends(second)?);
     let apart = |a: u8| second.map(|b| f32::from(a.abs_diff(b))).iter().sum::<f32>();
     Some(first.map(apart).iter().sum::<f32>() / 4.0)
-}
-
-fn swapped(query: Query) -> Query {
-    Query {
-        first: query.second,
-        second: query.first,
-    }
 }
 
 /// Smallest and largest distance from the episode's first state to a state of the segment.

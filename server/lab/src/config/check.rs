@@ -138,7 +138,7 @@ impl RunConfig {
             !spec.stages.is_empty() || !method::build(self)?.needs_true_stages(),
             "method",
             &self.method,
-            "another one here: this task does not know its stages",
+            "one that needs no true stages: this task does not know its own",
         )?;
         require(
             q.segment_len <= spec.episode_len,

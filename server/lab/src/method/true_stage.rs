@@ -1,5 +1,4 @@
-//! STAIR told the true stages: what stage alignment gives at its best, as SAC tells what a reward
-//! gives.
+//! STAIR told the true stages: what a gap without errors gives.
 
 use learn::stage::StageApproximator;
 
@@ -8,7 +7,7 @@ use crate::config::RunConfig;
 
 /// Measures stages by what the task itself says; no temporal distance is learned.
 ///
-/// Differs from the paper: it has no such bound.
+/// Differs from the paper: it has no such comparison.
 pub(crate) fn true_stage(config: &RunConfig) -> Method {
     Method {
         stage: Some(StageApproximator::True),

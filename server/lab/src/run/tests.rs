@@ -1,6 +1,7 @@
 //! What a method's recipe makes of a run, by looking into one.
 
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::mpsc::channel;
 
 use domain::teacher::{Oracle, Scripted};
@@ -8,6 +9,9 @@ use learn::exploration::Novelty;
 
 use super::*;
 use crate::config::Layers;
+
+/// For a name of its own for each folder: tests run side by side.
+static N_FOLDERS: AtomicU32 = AtomicU32::new(0);
 
 /// A run of the small task with its folder, which goes with it.
 struct Trained {
@@ -38,11 +42,8 @@ impl Trained {
             overrides: overrides.map(ToString::to_string).collect(),
             ..Layers::default()
         });
-        let name = format!(
-            "stair-run-{method}-{}-{}",
-            more.join(","),
-            std::process::id()
-        );
+        let number = N_FOLDERS.fetch_add(1, Ordering::Relaxed);
+        let name = format!("stair-run-{method}-{number}-{}", std::process::id());
         let folder = std::env::temp_dir().join(name);
         let _ = std::fs::remove_dir_all(&folder); // an earlier test run may have been killed
         let mut run = Run::start(config.expect("settings"), &folder).expect("a run");

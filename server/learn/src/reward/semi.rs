@@ -324,10 +324,10 @@ mod tests {
         assert_eq!(semi.cropped(&replay, query, &mut rng), query);
     }
 
-    /// The two parts of SURF act in a fit, each on its own. The order of drawing is the same with and
-    /// without either's effect, so where nothing is sure and nothing cropped the bits are equal.
+    /// Each of SURF's two parts acts in a fit. What it is held against draws the same numbers: pairs of
+    /// which nobody is sure, and crops that have no room.
     #[test]
-    fn sure_pairs_and_crops_move_a_fit_and_unsure_pairs_do_not() {
+    fn sure_pairs_and_crops_move_a_fit_and_others_do_not() {
         let replay = replay(12);
         let labeled = labeled(&replay, 24, |_| 10);
         let unlabeled = queries(&replay, 60);
@@ -335,13 +335,14 @@ mod tests {
             learning_rate: 3e-3,
             ..small()
         };
-        let predictions = |certainty, weight, is_cropping| {
+        let predictions = |certainty, weight, room| {
             let mut ensemble = RewardEnsemble::new(&config, 3, 2, 1, Device::CPU);
             let mut semi = semi(&SemiSupervisedConfig {
                 certainty,
                 weight,
-                is_cropping,
                 passes: 4,
+                margin: room,
+                crop_spread: room,
                 ..SemiSupervisedConfig::default()
             });
             let lesson = Lesson {
@@ -350,24 +351,15 @@ mod tests {
                 unlabeled: &unlabeled,
             };
             semi.fit(&mut ensemble, &lesson);
-            let bits = |p: f32| p.to_bits();
             let predicted = ensemble.probabilities(&replay, &unlabeled);
-            predicted
-                .into_iter()
-                .flatten()
-                .map(bits)
-                .collect::<Vec<_>>()
+            let bits = predicted.into_iter().flatten().map(f32::to_bits);
+            bits.collect::<Vec<_>>()
         };
-        let (sure, never) = (0.5, 1.0 - 1e-15);
-        let answers_alone = predictions(never, 1.0, false);
-        assert_eq!(
-            answers_alone,
-            predictions(never, 9.0, false),
-            "none was sure enough"
-        );
-        assert_ne!(answers_alone, predictions(sure, 1.0, false), "all were");
-        assert_ne!(predictions(sure, 1.0, false), predictions(sure, 9.0, false));
-        assert_ne!(answers_alone, predictions(never, 1.0, true), "cropped");
+        let (all, none) = (0.5, 1.0 - 1e-15);
+        let answers_alone = predictions(none, 1.0, 0);
+        assert_eq!(answers_alone, predictions(none, 9.0, 0), "no pair weighs");
+        assert_ne!(predictions(all, 1.0, 0), predictions(all, 9.0, 0));
+        assert_ne!(answers_alone, predictions(none, 1.0, 5), "cropped");
     }
 
     /// ⌈20 · 40 / 16⌉ = 50 minibatches of 16, 16 and 8 of 40: sixteen rounds and two thirds.
