@@ -184,7 +184,8 @@ impl Session {
     ) -> SessionOffered {
         let chosen: Vec<Query> = self.planned.iter().map(Planned::query).collect();
         let gaps = beliefs.stage_gap(candidates);
-        let symmetric_gaps = symmetric_gap(candidates, beliefs);
+        let symmetric_gaps = symmetric_gap(&gaps, candidates, beliefs);
+        let chosen_gaps = beliefs.stage_gap(&chosen);
         let of_chosen = are_same_stage(&chosen, replay);
         let of_pool = are_same_stage(candidates, replay);
         SessionOffered {
@@ -193,14 +194,14 @@ impl Session {
             n_queries: self.size,
             disagreement_chosen: mean(&beliefs.disagreement(&chosen)),
             disagreement_pool: mean(&beliefs.disagreement(candidates)),
-            stage_gap_chosen: mean(&beliefs.stage_gap(&chosen)),
+            stage_gap_chosen: mean(&chosen_gaps),
             stage_gap_pool: mean(&gaps),
             same_stage_chosen: of_chosen.and_then(|are| share(&are)),
             same_stage_pool: of_pool.as_deref().and_then(share),
             stage_gap_auc: of_pool
                 .as_deref()
                 .and_then(|are| area_under_curve(&gaps, are)),
-            symmetric_gap_chosen: mean(&symmetric_gap(&chosen, beliefs)),
+            symmetric_gap_chosen: mean(&symmetric_gap(&chosen_gaps, &chosen, beliefs)),
             symmetric_gap_pool: mean(&symmetric_gaps),
             symmetric_gap_auc: of_pool.and_then(|are| area_under_curve(&symmetric_gaps, &are)),
         }
@@ -208,10 +209,11 @@ impl Session {
 }
 
 /// Mean stage gap of both directions, `[N]`; empty for methods without a notion of stages.
-fn symmetric_gap(queries: &[Query], beliefs: &mut dyn Beliefs) -> Vec<f32> {
+///
+/// * `there` – gap of each query as it is, `[N]`
+fn symmetric_gap(there: &[f32], queries: &[Query], beliefs: &mut dyn Beliefs) -> Vec<f32> {
     let swapped: Vec<Query> = queries.iter().map(|q| q.swapped()).collect();
     let back = beliefs.stage_gap(&swapped);
-    let there = beliefs.stage_gap(queries);
     let both = there.iter().zip(&back);
     both.map(|(a, b)| f32::midpoint(*a, *b)).collect()
 }
