@@ -2,9 +2,11 @@
 
 mod blinding;
 mod clips;
+mod labelers;
 mod leases;
 mod runs;
 mod store_on_disk;
 pub(crate) mod studies;
 mod study_blinding;
+mod teachers;
 mod throughput;

@@ -80,6 +80,16 @@ impl TestApp {
         }
     }
 
+    /// A server over ready queries for those alone who bring its token, which strangers lack.
+    pub(crate) fn start_guarded(n_queries: u32) -> Self {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        Self {
+            run: seed(folder.path(), n_queries).to_string(),
+            server: ServerProcess::start_guarded(folder.path()),
+            folder,
+        }
+    }
+
     /// The data folder.
     pub(crate) fn data(&self) -> PathBuf {
         self.folder.path().to_owned()
@@ -161,7 +171,8 @@ impl Client {
         self.send_with(method, path, body.map(Value::to_string), &[])
     }
 
-    /// One request with a body of any kind and more headers.
+    /// One request with a body of any kind, JSON unless the headers say otherwise, and more
+    /// headers.
     pub(crate) fn send_with(
         &self,
         method: &str,
@@ -180,7 +191,8 @@ impl Client {
         {
             request = request.header(name, value);
         }
-        if body.is_some() {
+        let says_what = headers.iter().any(|(name, _)| *name == "content-type");
+        if body.is_some() && !says_what {
             request = request.header("content-type", "application/json");
         }
         let request = request.body(body.unwrap_or_default()).expect("a request");

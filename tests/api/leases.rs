@@ -153,6 +153,30 @@ fn a_skipped_query_uses_no_budget_and_withdraws_its_stage_question() {
 }
 
 #[test]
+fn an_answer_about_the_stages_of_a_skipped_pair_is_told_to_be_kept_aside() {
+    let app = TestApp::start(1);
+    let ada = app.labeler("Ada");
+    let leases = ada.leases(2);
+    assert_eq!(leases[1]["question"], "same_stage");
+    let skip = json!({"answer": "skip", "reason": "too dark"});
+    let skipped = ada.answers(&leases[0], &skip).expect(201).json();
+    // pressed before the page had heard of it, or in another tab
+    let late = ada.answers(&leases[1], &json!({"answer": "same"}));
+    let late = late.expect(410).json();
+    assert_eq!(late["type"], "/problems/question-withdrawn");
+    let told = late["detail"].as_str().expect("words");
+    assert!(told.contains("kept aside"), "{told}");
+    assert_eq!(ada.labels().len(), 1);
+
+    let taken_back = json!({"answer": "left", "supersedes": skipped["answer_id"]});
+    ada.answers(&leases[0], &taken_back).expect(201);
+    assert_eq!(ada.leases(2)[0]["lease_id"], leases[1]["lease_id"]);
+    ada.answers(&leases[1], &json!({"answer": "different"}))
+        .expect(201);
+    assert_eq!(ada.labels().len(), 3);
+}
+
+#[test]
 fn each_question_is_in_one_labelers_hands_and_sides_are_balanced() {
     let app = TestApp::start(20);
     let (ada, bo) = (app.labeler("Ada"), app.labeler("Bo"));

@@ -62,6 +62,22 @@ async fn what_is_stored_is_there_after_the_migrations_ran_again() {
     assert_eq!(store.progress(run).await.expect("progress").session_size, 2);
 }
 
+/// An agent that fell back to an earlier checkpoint and went another way from there.
+#[tokio::test]
+async fn other_segments_under_the_number_of_a_stored_query_are_refused() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let (store, run) = with_one_query(folder.path()).await;
+    let (mut elsewhere, mut other_poses) = (query(1), query(1));
+    elsewhere.second.segment.start += 1;
+    other_poses.first.poses[0][0] += 0.5;
+    for other in [elsewhere, other_poses] {
+        let told = store.offer(run, &[query(2), other], true).await;
+        assert!(matches!(told, Err(StoreError::OtherSegments(key)) if key.index == 1));
+        let size = store.progress(run).await.expect("progress").session_size;
+        assert_eq!(size, 1, "nothing of it is stored");
+    }
+}
+
 #[tokio::test]
 async fn a_lease_that_ran_out_goes_to_the_next_labeler_and_the_late_answer_is_kept_aside() {
     let folder = tempfile::tempdir().expect("a temporary folder");

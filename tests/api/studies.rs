@@ -1,9 +1,14 @@
 //! Studies over HTTP: from a file to exported answers, and every link that does not work.
 
-use serde_json::{Value, json};
+use std::path::Path;
+use std::process::Stdio;
 
-use crate::stories::server_process::{ServerProcess, stair, wait_for};
-use crate::support::Client;
+use domain::query::Question;
+use serde_json::{Value, json};
+use store::{ItemRole, NewItem, NewStudy, Store};
+
+use crate::stories::server_process::{ServerProcess, TOKEN, stair, wait_for};
+use crate::support::{Client, query};
 
 /// A small study of the small task: six pairs, one practice, one check, one repeat.
 pub(crate) const SMALL: &str = r#"
@@ -34,9 +39,6 @@ first = { policy = "expert", seed = 3, start = 20 }
 second = { policy = "random", seed = 3, start = 0 }
 expects = "WRONG"
 "#;
-
-/// The token of a server that wants one.
-const GUARD: &str = "not-to-be-guessed-0";
 
 /// The small study with one of both questions.
 pub(crate) fn small(question: &str) -> String {
@@ -77,8 +79,8 @@ impl Open {
     /// The small study at a server that wants a token, which its researcher has.
     pub(crate) fn guarded(question: &str) -> Self {
         let folder = tempfile::tempdir().expect("a temporary folder");
-        let server = ServerProcess::start_guarded(folder.path(), GUARD);
-        let researcher = Client::stranger_of(&server).with_token(GUARD);
+        let server = ServerProcess::start_guarded(folder.path());
+        let researcher = Client::stranger_of(&server).with_token(TOKEN);
         let request = json!({"text": small(question)});
         Self::made(server, researcher, folder, &request)
     }
@@ -281,7 +283,14 @@ fn at_a_server_with_a_token_a_labeler_needs_nothing_but_their_link() {
     let get = |who: &Client, path: &str, status| who.send("GET", path, None).expect(status);
     let code = study.code();
     get(&stranger, &format!("/join?code={code}"), 200);
-    get(&stranger, "/seat", 401);
+    for page in ["/seat", "/runs/1/label"] {
+        let way_back = get(&stranger, page, 401).text;
+        assert!(way_back.contains("Return code"), "{way_back}");
+    }
+    assert_eq!(
+        get(&stranger, "/api/v1/seat", 401).json()["type"],
+        "/problems/token-needed"
+    );
     let agreed = json!({"code": code, "agrees": true});
     let joined = stranger.send("POST", "/api/v1/join", Some(&agreed));
     let labeler = stranger.with_cookie_of(&joined.expect(201));
@@ -289,7 +298,12 @@ fn at_a_server_with_a_token_a_labeler_needs_nothing_but_their_link() {
     let seat = get(&labeler, "/api/v1/seat", 200).json();
     let labeler = labeler.on_run(&seat["parts"][0]["run_id"].to_string());
     let run = labeler.run();
-    get(&labeler, &format!("/runs/{run}/label"), 200);
+    let page = format!("/runs/{run}/label");
+    get(&labeler, &page, 200);
+    get(&labeler, "/runs/1/label", 401); // the run of the study's pairs is nobody's to answer
+    let form = [("content-type", "application/x-www-form-urlencoded")];
+    let typed = Some("name=Ada".to_owned());
+    labeler.send_with("POST", &page, typed, &form).expect(401);
     let first = &labeler.leases(1)[0];
     let clip = first["left"]["clip"].as_str().expect("where the clip is");
     assert!(get(&labeler, clip, 200).len() > 1_000);
@@ -314,9 +328,117 @@ fn at_a_server_with_a_token_a_labeler_needs_nothing_but_their_link() {
         ]);
         stair.args(["--token", token]).output().expect("stair")
     };
-    let told = export(GUARD);
+    let told = export(TOKEN);
     assert_eq!(String::from_utf8_lossy(&told.stdout).lines().count(), 9);
     assert_eq!(export("wrong").status.code(), Some(2));
+}
+
+#[test]
+fn labelers_by_script_answer_at_a_server_with_a_token() {
+    let study = Open::guarded("preference");
+    let server = format!("http://{}", study.server.address);
+    let told = stair()
+        .args(["study", "answer", "1", "--labelers", "2"])
+        .args(["--server", &server, "--token", TOKEN])
+        .stderr(Stdio::piped())
+        .output()
+        .expect("stair");
+    let complaint = String::from_utf8_lossy(&told.stderr);
+    assert!(told.status.success(), "{complaint}");
+    assert_eq!(study.labels().len(), 2 * 9);
+}
+
+#[test]
+fn nobody_takes_a_labelers_place_by_typing_its_name() {
+    let study = Open::start("same_stage");
+    let labeler = study.labeler();
+    let name = json!({"name": "labeler 1 of study 1"});
+    let typed = study
+        .researcher
+        .send("POST", "/api/v1/labelers", Some(&name));
+    assert_eq!(typed.expect(422).json()["type"], "/problems/name-kept");
+    answer_all(&labeler, "same");
+    let labels = study.labels();
+    let is_named = |row: &&Value| row["labeler"] == name["name"];
+    assert_eq!(
+        labels.iter().filter(is_named).count(),
+        9,
+        "that is the name of the place"
+    );
+}
+
+#[test]
+fn a_preparation_that_failed_is_taken_up_when_somebody_tries_again() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let runtime = tokio::runtime::Runtime::new().expect("threads");
+    runtime.block_on(prepare_a_pair_that_cannot_be_drawn(folder.path()));
+    let server = ServerProcess::start(folder.path());
+    let researcher = Client::stranger_of(&server);
+    let wait_until_it_has_failed = || {
+        wait_for("the preparation to fail", || {
+            let study = researcher.send("GET", "/api/v1/studies/1", None);
+            study.expect(200).json()["state"] == "failed"
+        });
+    };
+    wait_until_it_has_failed();
+    // Its clips are drawn again, and fail again; it does not wait for them for ever.
+    researcher
+        .send("POST", "/api/v1/studies/1/retry", None)
+        .expect(200);
+    wait_until_it_has_failed();
+}
+
+/// A study that is half prepared: its one pair has poses that the task does not have.
+async fn prepare_a_pair_that_cannot_be_drawn(folder: &Path) {
+    let store = Store::open(folder).await.expect("a store");
+    let study = NewStudy {
+        title: "Same stage?".into(),
+        question: Question::SameStage,
+        file: small("same_stage"),
+        folder: String::new(),
+    };
+    let id = store.add_study(study).await.expect("a study");
+    let pair = query(1);
+    let item = NewItem {
+        task: 0,
+        method: None,
+        role: ItemRole::Counted,
+        expects: None,
+        because: String::new(),
+        first: pair.first,
+        second: pair.second,
+    };
+    let tasks = ["go-fetch-return".to_owned()];
+    store
+        .add_items(id, &tasks, vec![item])
+        .await
+        .expect("a pair");
+}
+
+#[test]
+fn a_form_that_cannot_be_read_is_answered_with_a_page_that_says_why() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let server = ServerProcess::start(folder.path());
+    let researcher = Client::stranger_of(&server);
+    let study = json!({"text": small("preference")});
+    let made = researcher.send("POST", "/api/v1/studies", Some(&study));
+    let study = format!("/studies/{}", made.expect(201).json()["id"]);
+    let invite = |accept: &str| {
+        let path = format!("{study}/invitations");
+        let headers = [
+            ("content-type", "application/x-www-form-urlencoded"),
+            ("accept", accept),
+        ];
+        let form = Some("count=".to_owned());
+        researcher
+            .send_with("POST", &path, form, &headers)
+            .expect(422)
+    };
+    let why = "`count` must be a whole number, 0 or more; it is empty.";
+    assert_eq!(invite("application/json").json()["detail"], why);
+    let page = invite("text/html").text;
+    assert!(page.contains("<h1>") && page.contains(why), "{page}");
+    assert!(page.contains(&format!("href=\"{study}\"")), "{page}");
 }
 
 #[test]

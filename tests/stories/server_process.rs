@@ -10,6 +10,9 @@ use serde_json::{Value, json};
 /// How long anything may take before a story gives up on it.
 pub(crate) const PATIENCE: Duration = Duration::from_mins(3);
 
+/// The token of a server that wants one.
+pub(crate) const TOKEN: &str = "not-to-be-guessed-0";
+
 /// A server process over a data folder.
 pub(crate) struct ServerProcess {
     child: Child,
@@ -26,9 +29,9 @@ impl ServerProcess {
         Self::start_at(data, "127.0.0.1:0", None)
     }
 
-    /// The same, for those alone who bring a token.
-    pub(crate) fn start_guarded(data: &Path, token: &'static str) -> Self {
-        Self::start_at(data, "127.0.0.1:0", Some(token))
+    /// The same, for those alone who bring [`TOKEN`].
+    pub(crate) fn start_guarded(data: &Path) -> Self {
+        Self::start_at(data, "127.0.0.1:0", Some(TOKEN))
     }
 
     fn start_at(data: &Path, address: &str, token: Option<&'static str>) -> Self {
@@ -87,9 +90,9 @@ impl ServerProcess {
         *self = Self::start_at(&self.data, &self.address, self.token);
     }
 
-    /// The JSON body of a request that must succeed.
+    /// The JSON body of a request that must succeed, with the token where the server wants one.
     pub(crate) fn ask(&self, method: &str, path: &str, body: Option<&Value>) -> Value {
-        let (status, told) = ask(&self.address, method, path, None, body).expect("an answer");
+        let (status, told) = ask(&self.address, method, path, self.token, body).expect("an answer");
         assert!(
             (200..300).contains(&status),
             "{method} {path}: {status} {told}"

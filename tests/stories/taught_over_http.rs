@@ -1,5 +1,7 @@
 //! A scripted teacher that uses documented routes only teaches agents from nothing.
 
+use std::process::Stdio;
+
 use serde_json::json;
 
 use super::server_process::{ServerProcess, stair};
@@ -42,4 +44,28 @@ fn success_rate_once_taught(server: &ServerProcess, seed: u64) -> f64 {
     let last = rows.iter().rfind(|row| row["kind"] == "evaluation");
     let last = last.expect("an evaluation at the end");
     last["success_rate"].as_f64().expect("a number")
+}
+
+#[test]
+fn a_teacher_with_a_token_answers_at_a_server_that_wants_one() {
+    let data = tempfile::tempdir().expect("a temporary folder");
+    let server = ServerProcess::start_guarded(data.path());
+    let settings = json!({
+        "training": {"total_steps": 1500, "seed_steps": 200, "updates_per_step": 0.02},
+        "agent": {"hidden": [16, 16], "batch": 32},
+        "feedback": {"first_step": 400, "every": 200, "queries_per_session": 6, "budget": 12},
+        "evaluation": {"every": 100_000, "episodes": 1},
+    });
+    let run = server.create_run("uniform", 1, "", &settings);
+    let token = server.teacher_token(&run);
+    let url = format!("http://{}", server.address);
+    let taught = stair()
+        .args(["teach", "--server", &url, "--run", &run])
+        .args(["--teacher", "oracle", "--token", &token])
+        .stderr(Stdio::piped())
+        .output()
+        .expect("stair teach");
+    let complaint = String::from_utf8_lossy(&taught.stderr);
+    assert!(taught.status.success(), "{complaint}");
+    assert_eq!(server.finished(&run)["labels"], 12);
 }

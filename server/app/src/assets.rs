@@ -1,10 +1,10 @@
 //! The files of `web/static`, inside the program.
 
-use axum::extract::Path;
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use sha2::{Digest, Sha256};
 
+use crate::extract::Path;
 use crate::problem::Problem;
 
 /// `(path below web/static, bytes)`, sorted by path; written by the build script.

@@ -4,12 +4,13 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use axum::extract::{Request, State};
 use axum::http::uri::Authority;
-use axum::http::{HeaderMap, HeaderValue, Method, header};
+use axum::http::{HeaderMap, HeaderValue, Method, StatusCode, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse as _, Response};
-use store::{Secret, TokenKind};
+use store::{RunId, TokenKind};
 
-use crate::extract::{ACCESS_COOKIE, bearer, cookie, labeler};
+use crate::extract::{Cookie, bearer, host, labeler};
+use crate::pages::join::nobody_here;
 use crate::problem::Problem;
 use crate::state::AppState;
 
@@ -76,7 +77,7 @@ pub async fn number(request: Request, next: Next) -> Response {
 }
 
 /// Refuses requests under a foreign name (DNS rebinding), changes that another site makes
-/// (CSRF), and, where the server listens on a network, requests without a token.
+/// (CSRF), and, where the server listens on a network, requests without a token that is for them.
 pub async fn admit(State(app): State<AppState>, request: Request, next: Next) -> Response {
     let is_change = !matches!(
         *request.method(),
@@ -92,11 +93,15 @@ pub async fn admit(State(app): State<AppState>, request: Request, next: Next) ->
     if let Err(problem) = checked {
         return problem.into_response();
     }
-    let path = request.uri().path();
+    let (method, path) = (request.method(), request.uri().path());
     if app.needs_token && !is_open(path) {
-        match may_enter(&app, request.headers(), path).await {
-            Ok(true) => {}
-            Ok(false) => return Problem::token_needed().into_response(),
+        match entry(&app, method, path, request.headers()).await {
+            Ok(Entry::Granted) => {}
+            Ok(Entry::BeyondTeaching) => return Problem::beyond_teaching().into_response(),
+            Ok(Entry::Unknown) if is_labelers_page(method, path) => {
+                return nobody_here(StatusCode::UNAUTHORIZED);
+            }
+            Ok(Entry::Unknown) => return Problem::token_needed().into_response(),
             Err(problem) => return problem.into_response(),
         }
     }
@@ -140,10 +145,6 @@ fn check_origin(headers: &HeaderMap) -> Result<(), Problem> {
     )))
 }
 
-fn host(headers: &HeaderMap) -> Option<Authority> {
-    headers.get(header::HOST)?.to_str().ok()?.parse().ok()
-}
-
 /// What anybody may ask of a server on a network: whether it is up, the doors, and how they look.
 fn is_open(path: &str) -> bool {
     matches!(
@@ -152,38 +153,90 @@ fn is_open(path: &str) -> bool {
     ) || path.starts_with("/static/")
 }
 
-/// What a labeler of a study needs, who has no token of the server.
-fn is_for_labelers(path: &str) -> bool {
-    let is_own = matches!(path, "/seat" | "/api/v1/seat");
-    let is_of_run = |path: &str, end| {
-        let number = path.strip_suffix(end).unwrap_or_default();
-        !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit())
-    };
-    let page = path.strip_prefix("/runs/");
-    let leases = path.strip_prefix("/api/v1/runs/");
-    is_own
-        || page.is_some_and(|rest| is_of_run(rest, "/label"))
-        || leases.is_some_and(|rest| is_of_run(rest, "/leases"))
-        || path.starts_with("/api/v1/leases/")
-        || path.starts_with("/api/v1/clips/")
+/// What a labeler of a study opens: the seat, and the questions of a part of it.
+fn is_labelers_page(method: &Method, path: &str) -> bool {
+    is_read(method) && (path == "/seat" || run_between(path, "/runs/", "/label").is_some())
 }
 
-async fn may_enter(app: &AppState, headers: &HeaderMap, path: &str) -> Result<bool, Problem> {
-    let access = cookie(headers, ACCESS_COOKIE).map(Secret::brought);
-    for secret in bearer(headers).into_iter().chain(access) {
-        let kind = app.store.bearer(&secret).await?.map(|bearer| bearer.kind);
-        if matches!(kind, Some(TokenKind::Access | TokenKind::Teacher(_))) {
-            return Ok(true);
+/// What a labeler of a study needs, who has no token of the server.
+fn is_for_labelers(method: &Method, path: &str) -> bool {
+    is_labelers_page(method, path)
+        || is_read(method) && (path == "/api/v1/seat" || path.starts_with("/api/v1/clips/"))
+        || *method == Method::POST && run_between(path, "/api/v1/runs/", "/leases").is_some()
+        || path.starts_with("/api/v1/leases/")
+}
+
+/// What a program needs that answers `run`. Whose a lease is, and of which run a query, is for
+/// those to see who look them up.
+fn is_for_teachers(method: &Method, path: &str, run: RunId) -> bool {
+    let is_truth = path.starts_with("/api/v1/queries/") && path.ends_with("/task-rewards");
+    let is_run = run_between(path, "/api/v1/runs/", "") == Some(run);
+    let is_leasing = run_between(path, "/api/v1/runs/", "/leases") == Some(run);
+    is_read(method) && (is_run || is_truth || path.starts_with("/api/v1/clips/"))
+        || *method == Method::POST && is_leasing
+        || path.starts_with("/api/v1/leases/")
+}
+
+fn is_read(method: &Method) -> bool {
+    matches!(*method, Method::GET | Method::HEAD)
+}
+
+/// The run's number between two ends of a path: 12 of `/runs/12/label`.
+fn run_between(path: &str, before: &str, after: &str) -> Option<RunId> {
+    let digits = path.strip_prefix(before)?.strip_suffix(after)?;
+    let is_number = digits.bytes().all(|byte| byte.is_ascii_digit());
+    digits.parse().ok().filter(|_| is_number).map(RunId)
+}
+
+/// Whether a request may come in to a server on a network.
+enum Entry {
+    /// Its token, or its labeler's seat, is for this.
+    Granted,
+    /// A program's token is for less.
+    BeyondTeaching,
+    /// It brought nothing that opens this.
+    Unknown,
+}
+
+async fn entry(
+    app: &AppState,
+    method: &Method,
+    path: &str,
+    headers: &HeaderMap,
+) -> Result<Entry, Problem> {
+    let mut teaches = None;
+    let secrets = bearer(headers).into_iter();
+    for secret in secrets.chain(Cookie::Access.brought(headers)) {
+        match app.store.bearer(&secret).await?.map(|bearer| bearer.kind) {
+            Some(TokenKind::Access) => return Ok(Entry::Granted),
+            Some(TokenKind::Teacher(run)) => teaches = Some(run),
+            Some(TokenKind::Labeler) | None => {}
         }
     }
-    if !is_for_labelers(path) {
+    if let Some(run) = teaches {
+        return Ok(if is_for_teachers(method, path, run) {
+            Entry::Granted
+        } else {
+            Entry::BeyondTeaching
+        });
+    }
+    if is_for_labelers(method, path) && is_seated(app, path, headers).await? {
+        return Ok(Entry::Granted);
+    }
+    Ok(Entry::Unknown)
+}
+
+/// Whether the labeler was invited to a study; at a page with questions, to these. Leases and
+/// clips see to the rest.
+async fn is_seated(app: &AppState, path: &str, headers: &HeaderMap) -> Result<bool, Problem> {
+    let Some(labeler) = labeler(app, headers).await? else {
         return Ok(false);
-    }
-    // Whoever was invited, to what the study asks of them; leases and pages see to the rest.
-    match labeler(app, headers).await? {
-        Some(labeler) => Ok(app.store.seat_of(labeler.id).await?.is_some()),
-        None => Ok(false),
-    }
+    };
+    let Some((_, _, parts)) = app.store.seat_of(labeler.id).await? else {
+        return Ok(false);
+    };
+    let page_of = run_between(path, "/runs/", "/label");
+    Ok(page_of.is_none_or(|run| parts.iter().any(|part| part.run == run)))
 }
 
 #[cfg(test)]
@@ -212,26 +265,63 @@ mod tests {
 
     #[test]
     fn an_invited_labeler_reaches_their_pairs_and_nothing_of_the_researchers() {
-        for path in [
-            "/seat",
-            "/runs/12/label",
-            "/api/v1/runs/12/leases",
-            "/api/v1/leases/ab/answer",
-            "/api/v1/clips/ab.mp4",
+        for (method, path) in [
+            (Method::GET, "/seat"),
+            (Method::GET, "/runs/12/label"),
+            (Method::GET, "/api/v1/seat"),
+            (Method::POST, "/api/v1/runs/12/leases"),
+            (Method::PUT, "/api/v1/leases/ab/answer"),
+            (Method::GET, "/api/v1/clips/ab.mp4"),
         ] {
-            assert!(is_for_labelers(path), "{path}");
+            assert!(is_for_labelers(&method, path), "{method} {path}");
         }
-        for path in [
-            "/",
-            "/runs/12",
-            "/runs/12/labels/label",
-            "/api/v1/runs/12",
-            "/api/v1/runs/12/labels",
-            "/api/v1/studies/1/labels",
-            "/studies/1",
-            "/api/v1/queries/1/task-rewards",
+        for (method, path) in [
+            (Method::GET, "/"),
+            (Method::GET, "/runs/12"),
+            (Method::POST, "/runs/12/label"), // takes any name
+            (Method::GET, "/runs/12/labels/label"),
+            (Method::GET, "/runs//label"),
+            (Method::GET, "/api/v1/runs/12"),
+            (Method::GET, "/api/v1/runs/12/labels"),
+            (Method::GET, "/api/v1/studies/1/labels"),
+            (Method::GET, "/studies/1"),
+            (Method::GET, "/api/v1/queries/1/task-rewards"),
+            (Method::POST, "/api/v1/labelers"),
         ] {
-            assert!(!is_for_labelers(path) && !is_open(path), "{path}");
+            assert!(
+                !is_for_labelers(&method, path) && !is_open(path),
+                "{method} {path}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_program_reaches_what_teaching_its_run_takes_and_nothing_of_another() {
+        for (method, path) in [
+            (Method::GET, "/api/v1/runs/12"),
+            (Method::POST, "/api/v1/runs/12/leases"),
+            (Method::POST, "/api/v1/leases/ab/heartbeat"),
+            (Method::PUT, "/api/v1/leases/ab/answer"),
+            (Method::GET, "/api/v1/queries/3/task-rewards"),
+            (Method::GET, "/api/v1/clips/ab.mp4"),
+        ] {
+            assert!(is_for_teachers(&method, path, RunId(12)), "{method} {path}");
+        }
+        for (method, path) in [
+            (Method::GET, "/"),
+            (Method::GET, "/runs/12"),
+            (Method::GET, "/seat"),
+            (Method::GET, "/api/v1/runs"),
+            (Method::GET, "/api/v1/runs/1"),
+            (Method::GET, "/api/v1/runs/12/labels"),
+            (Method::POST, "/api/v1/runs/1/leases"),
+            (Method::POST, "/api/v1/runs/12/stop"),
+            (Method::POST, "/api/v1/runs/12/teacher-tokens"),
+        ] {
+            assert!(
+                !is_for_teachers(&method, path, RunId(12)),
+                "{method} {path}"
+            );
         }
     }
 

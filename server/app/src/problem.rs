@@ -1,15 +1,16 @@
 //! What goes wrong, told over HTTP: RFC 9457 problems.
 
 use axum::Json;
-use axum::extract::rejection::{JsonRejection, PathRejection, QueryRejection};
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
-use lab::config::{ConfigError, plainly};
+use lab::config::ConfigError;
 use serde::Serialize;
 use serde_json::{Value, json};
 use store::{StoreError, rfc3339};
 
 use crate::live::LiveError;
+
+mod rejection;
 
 /// A problem as clients receive it, `application/problem+json`.
 ///
@@ -186,6 +187,17 @@ impl Problem {
         )
     }
 
+    /// 403: a teacher token is for less than this.
+    pub fn beyond_teaching() -> Self {
+        let detail = "A teacher token is for answering its own run's queries: the run, its leases and answers, the queries' task rewards, and clips. Everything else needs the server's token.";
+        Self::new(
+            StatusCode::FORBIDDEN,
+            "/problems/beyond-teaching",
+            "Not for a teacher token",
+            detail,
+        )
+    }
+
     /// 403: the request comes from another site.
     pub fn foreign(detail: impl Into<String>) -> Self {
         Self::new(
@@ -296,6 +308,16 @@ impl From<StoreError> for Problem {
                 "/problems/lease-taken",
                 "Somebody else has this question now",
             ),
+            StoreError::Withdrawn => problem(
+                StatusCode::GONE,
+                "/problems/question-withdrawn",
+                "This is not asked any more",
+            ),
+            StoreError::NameKept(_) => problem(
+                StatusCode::UNPROCESSABLE_ENTITY,
+                "/problems/name-kept",
+                "This name is not free",
+            ),
             StoreError::Rule(rule) if rule.contains("labeler_name_not_empty") => Self::bad_request(
                 StatusCode::UNPROCESSABLE_ENTITY,
                 "A name has at least one and at most 80 letters.",
@@ -346,39 +368,5 @@ impl From<LiveError> for Problem {
 impl From<ConfigError> for Problem {
     fn from(error: ConfigError) -> Self {
         Self::unusable_settings(error.to_string())
-    }
-}
-
-impl From<JsonRejection> for Problem {
-    fn from(rejection: JsonRejection) -> Self {
-        let told = rejection.body_text();
-        let detail = match rejection {
-            JsonRejection::JsonDataError(_) => misfit(&told),
-            _ => told,
-        };
-        Self::bad_request(rejection.status(), detail)
-    }
-}
-
-/// A body that is JSON but not what was asked for: where, what stands there, and what to write.
-fn misfit(told: &str) -> String {
-    let told = told
-        .strip_prefix("Failed to deserialize the JSON body into the target type: ")
-        .unwrap_or(told);
-    match told.rsplit_once(" at line ") {
-        Some((message, place)) => format!("{} (line {place})", plainly(message)),
-        None => plainly(told),
-    }
-}
-
-impl From<PathRejection> for Problem {
-    fn from(rejection: PathRejection) -> Self {
-        Self::bad_request(StatusCode::NOT_FOUND, rejection.body_text())
-    }
-}
-
-impl From<QueryRejection> for Problem {
-    fn from(rejection: QueryRejection) -> Self {
-        Self::bad_request(rejection.status(), rejection.body_text())
     }
 }

@@ -52,7 +52,7 @@ pub enum Answer {
     Right,
     /// They cannot be told apart.
     Equal,
-    /// No judgement: a bad clip, or it cannot be told. Uses no budget.
+    /// No judgement: a bad clip, or it cannot be told. Uses no budget, unless a run is told so.
     Skip,
 }
 

@@ -46,7 +46,7 @@ pub struct OfferedQuery {
     pub asks_same_stage: bool,
     /// std over members of P(second ≻ first) when it was chosen, where beliefs were asked.
     pub disagreement: Option<f32>,
-    /// Stage gap in nats when it was chosen, where beliefs were asked.
+    /// Stage gap when it was chosen, in its approximator's unit, where beliefs were asked.
     pub stage_gap: Option<f32>,
     /// Mean task reward of a step over the ten newest complete episodes, where known: what
     /// scripted teachers measure their thresholds by.

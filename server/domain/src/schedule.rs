@@ -69,12 +69,12 @@ impl FeedbackSchedule {
     }
 
     /// Queries of session `index` in a run of `total_steps`, whatever is left of the budget: M in
-    /// the first, later at least one and at most the whole budget.
+    /// the first, later at least one, and at most the whole budget.
     ///
     /// Differs from B-Pref: t is the step at which the session is due, also if it had to wait.
     pub fn full_size(&self, index: u32, total_steps: u64) -> u32 {
         if index == 0 {
-            return self.queries_per_session;
+            return self.queries_per_session.min(self.budget);
         }
         let factor = self.session_sizes.factor(self.step_of(index), total_steps);
         let size = f64::from(self.queries_per_session) * factor;

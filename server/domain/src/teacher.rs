@@ -26,13 +26,14 @@ pub use skip::Skip;
 pub use threshold::Threshold;
 
 /// An answer as a run receives it.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Answered {
     /// Which query.
     pub key: QueryKey,
     /// `None` for a skip: no budget is used and a replacement is asked.
     ///
-    /// Differs from B-Pref, where a skipped query uses the budget and is not replaced.
+    /// Differs from B-Pref, where a skipped query uses the budget and is not replaced
+    /// (`queries.bpref_skips`).
     pub preference: Option<Preference>,
     /// Gap-free number of the answer in its run, from 1; a later one supersedes an earlier
     /// one for the same query.

@@ -14,43 +14,51 @@ pub(crate) struct Pool {
     pub segment_len: u32,
     /// Whether an episode's last possible start is never taken, as in the released code.
     pub leaves_last_start: bool,
+    /// Whether a segment may be paired with itself, as in the released code.
+    pub pairs_with_itself: bool,
 }
 
 impl Pool {
-    /// Draws `n` pairs.
-    ///
-    /// Both episodes are drawn with replacement and independently, starts uniformly over all
-    /// places where a segment fits. Fewer than `n` pairs only when no episode is long enough.
-    ///
-    /// Differs from the released code, which may pair a segment with itself.
-    pub(crate) fn draw(&self, replay: &Replay, n: usize, rng: &mut Rng) -> Vec<Query> {
+    /// Whether there is anything to ask about.
+    pub(crate) fn holds_a_pair(&self, replay: &Replay) -> bool {
+        let least = if self.pairs_with_itself { 1 } else { 2 };
+        let segments = self.episodes(replay).into_iter();
+        segments.map(|(_, n)| u64::from(n)).sum::<u64>() >= least
+    }
+
+    /// The episodes that are long enough, each with the number of places where a segment fits.
+    fn episodes(&self, replay: &Replay) -> Vec<(EpisodeId, u32)> {
         let complete = replay.complete_episodes();
         let newest = &complete[complete.len().saturating_sub(self.newest_episodes)..];
         let n_starts = |id: EpisodeId| {
             let n = (replay.episode(id).len + 1).saturating_sub(self.segment_len);
             n - u32::from(self.leaves_last_start && n > 1)
         };
-        let long_enough: Vec<EpisodeId> = newest
-            .iter()
-            .copied()
-            .filter(|id| n_starts(*id) > 0)
-            .collect();
-        let n_segments: u64 = long_enough.iter().map(|id| u64::from(n_starts(*id))).sum();
-        if n_segments < 2 {
+        let counted = newest.iter().map(|&id| (id, n_starts(id)));
+        counted.filter(|(_, n)| *n > 0).collect()
+    }
+
+    /// Draws `n` pairs.
+    ///
+    /// Both episodes are drawn with replacement and independently, starts uniformly over all
+    /// places where a segment fits. Fewer than `n` pairs only where no two segments fit.
+    pub(crate) fn draw(&self, replay: &Replay, n: usize, rng: &mut Rng) -> Vec<Query> {
+        if !self.holds_a_pair(replay) {
             return Vec::new();
         }
+        let long_enough = self.episodes(replay);
         let mut segment = || {
-            let episode = long_enough[rng.below(long_enough.len())];
+            let (episode, n_starts) = long_enough[rng.below(long_enough.len())];
             Segment {
                 episode,
-                start: rng.below(n_starts(episode) as usize) as u32,
+                start: rng.below(n_starts as usize) as u32,
                 len: self.segment_len,
             }
         };
         let mut queries = Vec::with_capacity(n);
         while queries.len() < n {
             let (first, second) = (segment(), segment());
-            if first != second {
+            if self.pairs_with_itself || first != second {
                 queries.push(Query { first, second });
             }
         }
@@ -100,6 +108,7 @@ mod tests {
             newest_episodes,
             segment_len: 5,
             leaves_last_start,
+            pairs_with_itself: false,
         }
     }
 
@@ -133,9 +142,28 @@ mod tests {
     }
 
     #[test]
+    fn the_released_codes_slip_pairs_a_segment_with_itself_now_and_then() {
+        let slip = Pool {
+            pairs_with_itself: true,
+            ..pool(1, false)
+        };
+        let mut rng = Rng::new(1, Stream::Test, 0);
+        let drawn = slip.draw(&replay(&[6]), 1000, &mut rng); // two segments
+        let with_itself = drawn.iter().filter(|q| q.first == q.second).count();
+        assert_eq!(drawn.len(), 1000);
+        assert!((400..600).contains(&with_itself), "{with_itself} of 1000");
+    }
+
+    #[test]
     fn where_there_is_one_segment_alone_there_is_no_pair() {
         let mut rng = Rng::new(1, Stream::Test, 0);
-        let drawn = pool(1, false).draw(&replay(&[5]), 3, &mut rng);
-        assert_eq!(drawn, []);
+        let (pool, replay) = (pool(1, false), replay(&[5]));
+        assert_eq!(pool.draw(&replay, 3, &mut rng), []);
+        assert!(!pool.holds_a_pair(&replay));
+        let slip = Pool {
+            pairs_with_itself: true,
+            ..pool
+        };
+        assert!(slip.holds_a_pair(&replay));
     }
 }

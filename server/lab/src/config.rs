@@ -173,6 +173,10 @@ pub enum WhileWaiting {
 /// What is asked.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "each is a setting of its own that is on or off"
+)]
 pub struct QueriesConfig {
     /// Steps in a segment, H; 0 takes the task's own.
     pub segment_len: u32,
@@ -192,6 +196,11 @@ pub struct QueriesConfig {
     /// Whether segments never take an episode's last possible start, a slip of the released
     /// code.
     pub bpref_starts: bool,
+    /// Whether a segment may be paired with itself, a slip of the released code.
+    pub bpref_pairs: bool,
+    /// Whether a skipped query counts as an answer to the budget and is not replaced, a slip of
+    /// the released code: a teacher who skips half of what is asked teaches with half the answers.
+    pub bpref_skips: bool,
     /// Share of queries that also ask whether both segments show the same stage, [0, 1].
     pub same_stage_fraction: f64,
     /// Whether indistinguishable answers train towards (½, ½) or are dropped.
@@ -212,6 +221,8 @@ impl Default for QueriesConfig {
             symmetric_gap: false,
             near_policy_episodes: 10,
             bpref_starts: false,
+            bpref_pairs: false,
+            bpref_skips: false,
             same_stage_fraction: 0.0,
             train_on_equal: true,
             sufficient_fraction: 1.0,

@@ -23,11 +23,17 @@ impl RunFolder {
     /// start that was cut short left in it is removed.
     ///
     /// # Errors
-    /// When it holds a run already or cannot be written.
+    /// When it holds a run already, or more of one than a start leaves, or cannot be written.
     pub(crate) fn create(root: &Path) -> Result<Self, RunError> {
         if Self::holds_run(root) {
             return Err(RunError::Occupied {
                 folder: root.to_owned(),
+            });
+        }
+        if let Some(found) = remains(root)? {
+            return Err(RunError::Remains {
+                folder: root.to_owned(),
+                found,
             });
         }
         let replay = root.join("replay");
@@ -125,12 +131,32 @@ impl RunFolder {
     /// Cuts the metrics to what belongs to a checkpoint.
     ///
     /// # Errors
-    /// When the disk refuses.
+    /// When they are shorter than that, or the disk refuses.
     pub(crate) fn cut_metrics(&mut self, len: u64) -> Result<(), RunError> {
         let path = self.root.join("metrics.jsonl");
+        let found = self.metrics.metadata().map(|metadata| metadata.len());
+        let found = found.map_err(io_error("read the metrics", &path))?;
+        if found < len {
+            return Err(RunError::CutShort {
+                path,
+                found,
+                expected: len,
+            });
+        }
         self.metrics
             .set_len(len)
             .map_err(io_error("cut the metrics", &path))
+    }
+
+    /// Puts a checkpoint that cannot be used where none is looked for, so that it does not count
+    /// as one of the newest two.
+    ///
+    /// # Errors
+    /// When the disk refuses.
+    pub(crate) fn set_aside(&self, step: u64) -> Result<(), RunError> {
+        let path = self.checkpoint_path(step);
+        fs::rename(&path, path.with_extension("damaged"))
+            .map_err(io_error("set a checkpoint aside", &path))
     }
 
     /// Writes a checkpoint and removes all but the newest two.
@@ -205,6 +231,37 @@ impl RunFolder {
     pub(crate) fn checkpoint_path(&self, step: u64) -> PathBuf {
         self.root.join(format!("checkpoint-{step:09}.stair"))
     }
+}
+
+/// What there is of a run in a folder without settings, beyond what a start that was cut short
+/// leaves: the journal and first rewards of its replay, a checkpoint of step 0, empty metrics.
+fn remains(root: &Path) -> Result<Option<String>, RunError> {
+    let metrics = root.join("metrics.jsonl");
+    if fs::metadata(&metrics).is_ok_and(|metadata| metadata.len() > 0) {
+        return Ok(Some("metrics.jsonl".into()));
+    }
+    let is_later =
+        |name: &str| name.starts_with("checkpoint-") && !name.starts_with("checkpoint-000000000.");
+    let is_further = |name: &str| {
+        let known = ["journal", "rewards-1", "rewards-1.partial"];
+        !known.contains(&name)
+    };
+    let found = first_entry(root, &is_later)?;
+    if found.is_some() {
+        return Ok(found);
+    }
+    let found = first_entry(&root.join("replay"), &is_further)?;
+    Ok(found.map(|name| format!("replay/{name}")))
+}
+
+/// The first name in a folder that is so; none where there is no folder.
+fn first_entry(folder: &Path, is: &dyn Fn(&str) -> bool) -> Result<Option<String>, RunError> {
+    let entries = match fs::read_dir(folder) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+        read => read.map_err(io_error("read the run's folder", folder))?,
+    };
+    let names = entries.filter_map(|entry| Some(entry.ok()?.file_name().display().to_string()));
+    Ok(names.filter(|name| is(name)).min())
 }
 
 /// Writes a file so that a kill leaves the old or the new one.

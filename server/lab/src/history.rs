@@ -36,6 +36,30 @@ pub struct RunHistory {
     /// Wall time so far, seconds, waiting for answers included; of a part that was killed, up to
     /// its last checkpoint.
     pub wall_s: f64,
+    /// The scripted teacher that answers it, by name; none where people or programs do, and in runs
+    /// of before it was kept.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub teacher: Option<String>,
+}
+
+/// A teacher that a run cannot go on with.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum TeacherMisfit {
+    /// Another one than has answered so far.
+    #[error(
+        "{there} has answered this run so far, and {wanted} would go on otherwise; leave --teacher out, or begin a new run"
+    )]
+    Another {
+        /// Who has.
+        there: String,
+        /// Who is to.
+        wanted: String,
+    },
+    /// Nobody knows who has answered so far.
+    #[error(
+        "it was not kept who answers this run (it began with an earlier revision, on a server's page, or its history was lost); say it with --teacher"
+    )]
+    Unknown,
 }
 
 impl RunHistory {
@@ -52,6 +76,23 @@ impl RunHistory {
             Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(Self::default()),
             Err(error) => Err(io_error("read the run's history", &path)(error)),
         }
+    }
+
+    /// Of a run that nobody has worked on yet.
+    ///
+    /// # Errors
+    /// When the disk refuses.
+    pub(crate) fn begin(folder: &Path, teacher: Option<&str>) -> Result<(), RunError> {
+        let history = Self {
+            teacher: teacher.map(str::to_owned),
+            ..Self::default()
+        };
+        history.keep(folder)
+    }
+
+    fn keep(&self, folder: &Path) -> Result<(), RunError> {
+        let text = serde_json::to_vec(self).expect("a history is plain values");
+        write_durably(&folder.join(FILE), &text)
     }
 
     /// Notes who goes on with the run now.
@@ -112,6 +153,25 @@ impl<'a> Sitting<'a> {
         Ok((sitting, complaint))
     }
 
+    /// Keeps which scripted teacher answers: the one that is wanted, else the one who has.
+    ///
+    /// # Errors
+    /// [`TeacherMisfit`], where another one has or it is not known who.
+    pub fn answered_by(&mut self, wanted: Option<&str>) -> Result<&str, TeacherMisfit> {
+        let there = self.before.teacher.take();
+        let teacher = match (there, wanted) {
+            (Some(there), Some(wanted)) if there != wanted => {
+                self.before.teacher = Some(there.clone());
+                let wanted = wanted.to_owned();
+                return Err(TeacherMisfit::Another { there, wanted });
+            }
+            (Some(there), _) => there,
+            (None, Some(wanted)) => wanted.to_owned(),
+            (None, None) => return Err(TeacherMisfit::Unknown),
+        };
+        Ok(self.before.teacher.insert(teacher))
+    }
+
     /// The whole so far.
     pub fn history(&self) -> RunHistory {
         RunHistory {
@@ -155,8 +215,7 @@ impl<'a> Sitting<'a> {
     /// # Panics
     /// Never: a history is plain values.
     pub fn keep(&self) -> Result<(), RunError> {
-        let text = serde_json::to_vec(&self.history()).expect("a history is plain values");
-        write_durably(&self.folder.join(FILE), &text)
+        self.history().keep(self.folder)
     }
 }
 
@@ -187,6 +246,32 @@ mod tests {
         let kept = RunHistory::of(folder.path()).unwrap();
         assert_eq!(kept.revisions, ["a", "b"]);
         assert_eq!(kept.machines, ["two cores"]);
+    }
+
+    #[test]
+    fn whoever_answered_a_run_goes_on_answering_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let provenance = Provenance {
+            revision: "a".into(),
+            machine: "two cores".into(),
+        };
+        let begin = || {
+            let (sitting, _) = Sitting::begin(folder.path(), &provenance, Instant::now()).unwrap();
+            sitting
+        };
+        let mut sitting = begin();
+        assert_eq!(sitting.answered_by(None), Err(TeacherMisfit::Unknown));
+        assert_eq!(sitting.answered_by(Some("mistaken")), Ok("mistaken"));
+        sitting.keep().unwrap();
+
+        let mut sitting = begin();
+        let told = sitting.answered_by(Some("oracle")).unwrap_err().to_string();
+        assert!(
+            told.contains("mistaken") && told.contains("oracle"),
+            "{told}"
+        );
+        assert_eq!(sitting.answered_by(None), Ok("mistaken"));
+        assert_eq!(sitting.answered_by(Some("mistaken")), Ok("mistaken"));
     }
 
     #[test]

@@ -35,11 +35,6 @@ pub enum Event {
     Checkpointed(Checkpointed),
     /// The last environment step was taken.
     Finished(Finished),
-    /// The run cannot go on.
-    Failed {
-        /// For the person who reads it.
-        reason: String,
-    },
 }
 
 /// What a run is doing.
@@ -69,8 +64,6 @@ pub enum Activity {
     Asking,
     /// Training on the answers so far.
     Learning,
-    /// Trying the policy on held-out episodes.
-    Evaluating,
     /// Paused by a command.
     Paused,
 }
@@ -102,8 +95,8 @@ pub struct Metrics {
     /// `InfoNCE` loss of the temporal distance.
     pub temporal_loss: Option<f64>,
     /// Environment steps per second of wall time in the interval, pauses and waiting for answers
-    /// left out.
-    pub steps_per_s: f64,
+    /// left out. `None` in the first row since a start, whose interval is not known.
+    pub steps_per_s: Option<f64>,
 }
 
 /// A session as it was put to the teacher; pool values show what choosing did.
@@ -119,7 +112,8 @@ pub struct SessionOffered {
     pub disagreement_chosen: Option<f64>,
     /// Mean disagreement of all candidates.
     pub disagreement_pool: Option<f64>,
-    /// Mean stage gap of the chosen queries: nats where it is a temporal distance, else in [0, 1].
+    /// Mean stage gap of the chosen queries: nats where it is a temporal distance, stages where these
+    /// are known, else in [0, 1].
     pub stage_gap_chosen: Option<f64>,
     /// Mean stage gap of all candidates, in the same unit.
     pub stage_gap_pool: Option<f64>,

@@ -74,7 +74,7 @@ impl Meter {
             let worked = (now - since).saturating_sub(rested);
             (step - from) as f64 / worked.as_secs_f64().max(1e-9)
         };
-        let steps_per_s = self.last_row.replace((step, now)).map_or(0.0, rate);
+        let steps_per_s = self.last_row.replace((step, now)).map(rate);
         let complete = replay.complete_episodes();
         let recent = &complete[complete.len().saturating_sub(N_RECENT)..];
         let mean = |value: &dyn Fn(&learn::replay::EpisodeInfo) -> f64| {

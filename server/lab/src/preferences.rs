@@ -25,7 +25,7 @@ pub(crate) struct Asked {
 pub(crate) enum AnswerState {
     /// Nothing yet.
     Open,
-    /// Refused; a replacement was asked.
+    /// Refused; a replacement was asked, unless skips use up budget.
     Skipped,
     /// Trained on from the next fit.
     Preferred(Preference),
@@ -83,12 +83,18 @@ impl Preferences {
         self.0.values().map(|a| (a.key, a.query)).collect()
     }
 
-    /// Preferences so far: what the budget counts.
+    /// Preferences so far: what the budget counts, beside skips where these use it up.
     pub(crate) fn n_preferred(&self) -> u32 {
-        self.0
-            .values()
-            .filter(|a| matches!(a.state, AnswerState::Preferred(_)))
-            .count() as u32
+        self.count(|state| matches!(state, AnswerState::Preferred(_)))
+    }
+
+    /// Queries that were refused and are so still.
+    pub(crate) fn n_skipped(&self) -> u32 {
+        self.count(|state| state == AnswerState::Skipped)
+    }
+
+    fn count(&self, is: impl Fn(AnswerState) -> bool) -> u32 {
+        self.0.values().filter(|asked| is(asked.state)).count() as u32
     }
 
     /// What the reward ensemble trains on.

@@ -1,5 +1,6 @@
 //! Algorithm 1: act, ask, learn. One loop for every method.
 
+use std::collections::BTreeMap;
 use std::sync::mpsc::{Receiver, TryRecvError};
 use std::time::Duration;
 
@@ -8,9 +9,9 @@ use domain::query::Query;
 use domain::random::{Rng, Stream};
 use domain::sampler::{QuerySampler, Uniform};
 use domain::schedule::Every;
-use domain::teacher::Teacher;
+use domain::teacher::{Answered, Teacher};
 use learn::beliefs::LearnedBeliefs;
-use learn::replay::{BatchRule, Replay};
+use learn::replay::{BatchRule, Replay, ReplayMark};
 use learn::reward::{Estimate, Labeled, SteeringConfig};
 use serde::{Deserialize, Serialize};
 
@@ -46,8 +47,13 @@ pub struct Run {
     folder: RunFolder,
     lanes: Lanes,
     replay: Replay,
+    /// What the checkpoints that are there say of the replay, by their step.
+    marks: BTreeMap<u64, ReplayMark>,
     learner: Learner,
     preferences: Preferences,
+    /// Answers to queries that are still to be asked: given before a checkpoint was lost with
+    /// which the run had asked them. It goes the same way again and will.
+    early: Vec<Answered>,
     session: Option<Session>,
     progress: Progress,
     meter: Meter,
@@ -64,6 +70,12 @@ pub(crate) struct Progress {
     n_fits: u32,
     consumed_sequence: u64,
     last_evaluation: Option<(f64, f64)>,
+    /// Step of the last evaluation.
+    #[serde(default)]
+    evaluated_at: Option<u64>,
+    /// Whether its end was said.
+    #[serde(default)]
+    is_finished: bool,
 }
 
 /// How [`Run::drive`] ended.
@@ -156,12 +168,19 @@ impl Run {
         Ok(teacher.ask(&offers)?)
     }
 
-    /// Takes in answers that arrived; asks a replacement for each skip of the open session.
+    /// Takes in answers that arrived; asks a replacement for each skip of the open session, unless
+    /// skips are to use up budget.
     fn take_answers(&mut self, teacher: &mut dyn Teacher) -> Result<(), RunError> {
-        for answered in teacher.collect(self.progress.consumed_sequence)? {
-            self.progress.consumed_sequence = answered.sequence;
-            let before = self.preferences.answer(&answered);
-            let is_new_skip = answered.preference.is_none() && before == Some(AnswerState::Open);
+        let mut answers = std::mem::take(&mut self.early);
+        answers.extend(teacher.collect(self.progress.consumed_sequence)?);
+        for answered in answers {
+            let consumed = &mut self.progress.consumed_sequence;
+            *consumed = (*consumed).max(answered.sequence);
+            let Some(before) = self.preferences.answer(&answered) else {
+                self.early.push(answered);
+                continue;
+            };
+            let is_new_skip = answered.preference.is_none() && before == AnswerState::Open;
             let Some(session) = self
                 .session
                 .as_mut()
@@ -169,7 +188,8 @@ impl Run {
             else {
                 continue;
             };
-            if is_new_skip && let Some(replacement) = session.replacement() {
+            let is_replaced = is_new_skip && !self.config.queries.bpref_skips;
+            if is_replaced && let Some(replacement) = session.replacement() {
                 self.preferences.ask(replacement.key(), replacement.query());
                 teacher.ask(&[replacement.offer(&self.replay)])?;
             }
@@ -191,14 +211,11 @@ impl Run {
     }
 
     fn asks_now(&self) -> bool {
-        let n_answers = self.preferences.n_preferred();
+        let (session, step) = (self.progress.n_sessions, self.progress.step);
         self.method.sampler.is_some()
             && self.session.is_none()
-            && self
-                .config
-                .feedback
-                .is_due(self.progress.n_sessions, self.progress.step, n_answers)
-            && !self.replay.complete_episodes().is_empty()
+            && self.config.feedback.is_due(session, step, self.n_spent())
+            && self.pool().holds_a_pair(&self.replay)
     }
 
     /// Chooses a session's queries, makes them durable, and asks.
@@ -212,11 +229,11 @@ impl Run {
         let size = self.config.feedback.session_size(
             index,
             self.config.training.total_steps,
-            self.preferences.n_preferred(),
+            self.n_spent(),
         );
         let queries = &self.config.queries;
         let mut rng = Rng::new(self.config.seed, Stream::Candidates, u64::from(index));
-        let n_candidates = (size * queries.candidates_per_query) as usize;
+        let n_candidates = size as usize * queries.candidates_per_query as usize;
         let candidates = self.pool().draw(&self.replay, n_candidates, &mut rng);
         let asked = self.preferences.asked();
         let sampler: &dyn QuerySampler = match &self.method.sampler {
@@ -259,15 +276,16 @@ impl Run {
             newest_episodes: newest_episodes.unwrap_or(queries.newest_episodes),
             segment_len: self.config.segment_len(&self.spec),
             leaves_last_start: queries.bpref_starts,
+            pairs_with_itself: queries.bpref_pairs,
         }
     }
 
     /// Pairs that nobody is asked about, for methods that learn from them too.
     fn unlabeled(&self, session: u32) -> Vec<Query> {
-        let per_query = self.learner.unlabeled_per_query();
-        let n = per_query * self.full_size(session);
+        let per_query = self.learner.unlabeled_per_query() as usize;
+        let n = per_query * self.full_size(session) as usize;
         let mut rng = Rng::new(self.config.seed, Stream::Unlabeled, u64::from(session));
-        self.pool().draw(&self.replay, n as usize, &mut rng)
+        self.pool().draw(&self.replay, n, &mut rng)
     }
 
     /// Fits the reward to all answers and relabels the replay.
@@ -378,8 +396,9 @@ impl Run {
         let has_target = !is_exploring || self.config.exploration.is_unsupervised;
         let owed =
             |step: u64| (step.saturating_sub(t.seed_steps) as f64 * t.updates_per_step) as u64;
+        let can_learn = has_target && !self.replay.is_empty(); // as it is without seed steps
         Due {
-            n_updates: if has_target {
+            n_updates: if can_learn {
                 owed(now) - owed(before)
             } else {
                 0
@@ -416,7 +435,17 @@ impl Run {
     }
 
     fn has_budget(&self) -> bool {
-        self.preferences.n_preferred() < self.config.feedback.budget
+        self.n_spent() < self.config.feedback.budget
+    }
+
+    /// Of the budget.
+    fn n_spent(&self) -> u32 {
+        let n_skipped = if self.config.queries.bpref_skips {
+            self.preferences.n_skipped()
+        } else {
+            0
+        };
+        self.preferences.n_preferred() + n_skipped
     }
 
     /// Whether the rewards are moved by the critics on the way on from `step`, and how: after a
@@ -425,8 +454,11 @@ impl Run {
     fn steering(&self, step: u64) -> Option<SteeringConfig> {
         let earlier = step.saturating_sub(self.lanes.len() as u64);
         let is_due = |steering: &SteeringConfig| Every(steering.every).is_crossed(earlier, step);
-        let may = self.progress.n_fits > 0 && self.has_budget();
-        self.method.steering.filter(|s| may && is_due(s))
+        let may = || {
+            let has_answers = !self.latest_answers().is_empty(); // all may have been skipped
+            self.progress.n_fits > 0 && self.has_budget() && has_answers
+        };
+        self.method.steering.filter(|s| is_due(s) && may())
     }
 
     /// A session's worth of the newest answers.

@@ -185,33 +185,15 @@ fn a_damaged_checkpoint_is_passed_over_for_the_one_before() {
     let config = short();
     let expected = uninterrupted(&config, "undamaged");
     let mut run = Run::start(config, &folder.0).unwrap();
-    let (sender, commands) = channel();
     let mut n_seen = 0;
-    let stop_at_third_checkpoint = &mut |event: Event| {
+    let is_third_checkpoint = |event: &Event| {
         n_seen += usize::from(matches!(event, Event::Checkpointed(_)));
-        if n_seen == 3 {
-            sender.send(Command::Stop).unwrap();
-        }
+        n_seen == 3
     };
     let mut teacher = Scripted::new(Box::new(Oracle), 0);
-    assert_eq!(
-        run.drive(&mut teacher, &commands, stop_at_third_checkpoint)
-            .unwrap(),
-        Outcome::Stopped
-    );
+    stop_at(&mut run, &mut teacher, is_third_checkpoint);
     drop(run);
-    let names = std::fs::read_dir(&folder.0)
-        .unwrap()
-        .map(|e| e.unwrap().path());
-    let mut checkpoints: Vec<PathBuf> = names
-        .filter(|p| p.extension().is_some_and(|e| e == "stair"))
-        .collect();
-    checkpoints.sort();
-    let newest = checkpoints.last().unwrap();
-    let mut bytes = std::fs::read(newest).unwrap();
-    let middle = bytes.len() / 2;
-    bytes[middle] ^= 1;
-    std::fs::write(newest, bytes).unwrap();
+    damage_newest_checkpoint(&folder);
 
     let (mut run, complaints) = Run::resume(&folder.0).unwrap();
     assert_eq!(complaints.len(), 1, "{complaints:?}");
@@ -220,6 +202,97 @@ fn a_damaged_checkpoint_is_passed_over_for_the_one_before() {
         finished(drive(&mut run, &mut teacher).0).weights,
         expected.weights
     );
+}
+
+/// Drives a run until it says something that is so, and lets it stop there.
+fn stop_at(run: &mut Run, teacher: &mut dyn Teacher, mut is: impl FnMut(&Event) -> bool) {
+    let (sender, commands) = channel();
+    let stop = &mut |event: Event| {
+        if is(&event) {
+            sender.send(Command::Stop).unwrap();
+        }
+    };
+    let outcome = run.drive(teacher, &commands, stop).unwrap();
+    assert_eq!(outcome, Outcome::Stopped);
+}
+
+fn damage_newest_checkpoint(folder: &Folder) {
+    let names = std::fs::read_dir(&folder.0)
+        .unwrap()
+        .map(|e| e.unwrap().path());
+    let checkpoints = names.filter(|p| p.extension().is_some_and(|e| e == "stair"));
+    let newest: PathBuf = checkpoints.max().unwrap();
+    let mut bytes = std::fs::read(&newest).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    std::fs::write(newest, bytes).unwrap();
+}
+
+/// Its session was offered, answered and closed at the step of the checkpoint that is lost: by
+/// people, who are not asked the same again.
+#[test]
+fn answers_to_what_a_lost_checkpoint_had_asked_count_when_the_run_comes_there_again() {
+    let folder = Folder::new("answered");
+    let expected = uninterrupted(&short(), "answered-undamaged");
+    let mut run = Run::start(short(), &folder.0).unwrap();
+    let mut mailbox = Scripted::new(Box::new(Oracle), 0);
+    stop_at(&mut run, &mut mailbox, |event| {
+        matches!(event, Event::SessionClosed(_))
+    });
+    assert_eq!((run.step(), run.consumed_sequence()), (600, 5));
+    drop(run);
+    damage_newest_checkpoint(&folder);
+
+    let (mut run, complaints) = Run::resume(&folder.0).unwrap();
+    assert_eq!(complaints.len(), 1, "{complaints:?}");
+    assert_eq!((run.step(), run.consumed_sequence()), (400, 0));
+    stop_at(&mut run, &mut mailbox, |event| {
+        matches!(event, Event::Checkpointed(_))
+    });
+    drop(run);
+    let (mut run, complaints) = Run::resume(&folder.0).unwrap();
+    assert_eq!(complaints, [""; 0], "the damaged one is set aside");
+    assert_eq!((run.step(), run.consumed_sequence()), (600, 5));
+    let actual = finished(drive(&mut run, &mut mailbox).0);
+    assert_eq!((actual.labels, actual.weights), (10, expected.weights));
+}
+
+#[test]
+fn a_folder_that_has_lost_its_settings_or_its_metrics_is_left_as_it_is() {
+    let folder = Folder::new("lost");
+    let mut run = Run::start(short(), &folder.0).unwrap();
+    finished(drive(&mut run, &mut Scripted::new(Box::new(Oracle), 0)).0);
+    drop(run);
+    let (settings, metrics) = (folder.0.join("config.toml"), folder.0.join("metrics.jsonl"));
+    let aside = folder.0.join("aside");
+    std::fs::rename(&settings, &aside).unwrap();
+    let told = Run::start(short(), &folder.0).err().unwrap().to_string();
+    assert!(told.contains("metrics.jsonl"), "{told}");
+    std::fs::rename(&aside, &settings).unwrap();
+
+    let whole = std::fs::read(&metrics).unwrap();
+    std::fs::write(&metrics, &whole[..whole.len() / 2]).unwrap();
+    let told = Run::resume(&folder.0).err().unwrap().to_string();
+    assert!(told.contains("metrics.jsonl"), "{told}");
+    std::fs::write(&metrics, &whole).unwrap();
+    assert!(Run::resume(&folder.0).is_ok());
+}
+
+#[test]
+fn a_finished_run_that_is_taken_up_again_adds_nothing() {
+    let folder = Folder::new("finished");
+    let config = short_of("stair", &["evaluation.every=500"]); // the end lies beyond a trial
+    let mut run = Run::start(config, &folder.0).unwrap();
+    let expected = finished(drive(&mut run, &mut Scripted::new(Box::new(Oracle), 0)).0);
+    drop(run);
+    let metrics = || std::fs::read(folder.0.join("metrics.jsonl")).unwrap();
+    let before = metrics();
+    let (mut run, _) = Run::resume(&folder.0).unwrap();
+    let mut teacher = Scripted::new(Box::new(Oracle), run.consumed_sequence());
+    let (outcome, events) = drive(&mut run, &mut teacher);
+    assert_eq!(finished(outcome), expected);
+    assert_eq!(events, []);
+    assert_eq!(metrics(), before);
 }
 
 /// Skips every third query, answers the others as the oracle does.
@@ -250,15 +323,29 @@ impl Teacher for Choosy {
 
 #[test]
 fn a_skipped_query_is_replaced_and_uses_no_budget() {
-    let folder = Folder::new("choosy");
-    let mut run = Run::start(short(), &folder.0).unwrap();
+    let (n_skipped, n_labels) = answered_by_choice("choosy", short());
+    assert!(n_skipped >= 4, "{n_skipped}");
+    assert_eq!(n_labels, 10);
+}
+
+#[test]
+fn a_skipped_query_uses_up_budget_where_the_released_codes_slip_is_wanted() {
+    let mut config = short();
+    config.queries.bpref_skips = true;
+    // two sessions of 5, the queries 0 and 3 of each skipped
+    assert_eq!(answered_by_choice("choosy-slip", config), (4, 6));
+}
+
+/// Queries that a choosy teacher skips in a run, and answers that the run is given.
+fn answered_by_choice(name: &str, config: RunConfig) -> (usize, u32) {
+    let folder = Folder::new(name);
+    let mut run = Run::start(config, &folder.0).unwrap();
     let mut teacher = Choosy {
         oracle: Scripted::new(Box::new(Oracle), 0),
         skipped: Vec::new(),
     };
     let (outcome, _) = drive(&mut run, &mut teacher);
-    assert!(teacher.skipped.len() >= 4, "{:?}", teacher.skipped);
-    assert_eq!(finished(outcome).labels, 10);
+    (teacher.skipped.len(), finished(outcome).labels)
 }
 
 #[test]

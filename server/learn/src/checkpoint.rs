@@ -113,6 +113,22 @@ impl Archive {
         serde_json::from_str(json).map_err(|e| LearnError::section(name, e.to_string()))
     }
 
+    /// The value of a JSON section; the default one where there is none, for what earlier revisions
+    /// of the program did not write.
+    ///
+    /// # Errors
+    /// When the section is of another kind, or not a `T`.
+    pub fn json_or_default<T: DeserializeOwned + Default>(
+        &self,
+        name: &str,
+    ) -> Result<T, LearnError> {
+        if self.has(name) {
+            self.json(name)
+        } else {
+            Ok(T::default())
+        }
+    }
+
     /// Whether there is a section of that name.
     pub fn has(&self, name: &str) -> bool {
         self.sections.contains_key(name)

@@ -11,9 +11,11 @@ use domain::episode::{EpisodeId, Segment, SegmentRecord};
 
 mod batch;
 mod journal;
+mod lane;
 
 pub use batch::{Batch, BatchRule, RewardSource};
-pub use journal::ReplayMark;
+pub use journal::{ReplayMark, forget_others};
+use lane::{Lane, NO_STAGE, StepMark, row};
 
 /// Numbers in one row of each kind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -76,9 +78,6 @@ pub struct EpisodeInfo {
     pub is_success: bool,
 }
 
-/// Stage byte of a state whose task does not know its stages.
-const NO_STAGE: u8 = u8::MAX;
-
 /// Every transition of a run.
 #[derive(Debug)]
 pub struct Replay {
@@ -88,50 +87,6 @@ pub struct Replay {
     complete: Vec<EpisodeId>,
     keeps_disagreement: bool,
     journal: journal::Journal,
-}
-
-/// One environment's rows. States have one row more per episode than steps.
-#[derive(Debug, Default)]
-struct Lane {
-    observations: Vec<f32>,
-    poses: Vec<f32>,
-    stages: Vec<u8>,
-    actions: Vec<f32>,
-    learned_rewards: Vec<f32>,
-    /// As long as the rewards where it is kept, else empty.
-    disagreements: Vec<f32>,
-    task_rewards: Vec<f64>,
-    marks: Vec<StepMark>,
-    /// Which episode each step belongs to.
-    episode_of: Vec<u32>,
-    running: Option<EpisodeId>,
-}
-
-/// Success and end of a step in one byte.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct StepMark(u8);
-
-impl StepMark {
-    fn new(success: bool, end: Option<EpisodeEnd>) -> Self {
-        let end = match end {
-            None => 0,
-            Some(EpisodeEnd::Terminal) => 2,
-            Some(EpisodeEnd::TimeLimit) => 4,
-        };
-        Self(u8::from(success) | end)
-    }
-
-    fn success(self) -> bool {
-        self.0 & 1 != 0
-    }
-
-    fn end(self) -> Option<EpisodeEnd> {
-        match self.0 & 6 {
-            2 => Some(EpisodeEnd::Terminal),
-            4 => Some(EpisodeEnd::TimeLimit),
-            _ => None,
-        }
-    }
 }
 
 #[derive(Debug)]
@@ -475,30 +430,6 @@ impl Replay {
         assert!(t < episode.len as usize, "step {t} of episode {}", id.0);
         (lane, episode.first_step + t)
     }
-}
-
-impl Lane {
-    fn push_state(
-        &mut self,
-        shape: ReplayShape,
-        observation: &[f32],
-        pose: &[f32],
-        stage: Option<u8>,
-    ) {
-        assert_eq!(
-            observation.len(),
-            shape.observation,
-            "size of an observation"
-        );
-        assert_eq!(pose.len(), shape.pose, "size of a pose");
-        self.observations.extend_from_slice(observation);
-        self.poses.extend_from_slice(pose);
-        self.stages.push(stage.unwrap_or(NO_STAGE));
-    }
-}
-
-fn row(values: &[f32], index: usize, size: usize) -> &[f32] {
-    &values[index * size..(index + 1) * size]
 }
 
 #[cfg(test)]

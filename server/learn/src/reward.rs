@@ -43,10 +43,11 @@ pub struct Labeled {
 pub struct RewardFit {
     /// Passes over all preferences.
     pub n_epochs: u32,
-    /// Cross-entropy of the last pass, nats, mean over members.
+    /// Cross-entropy of the last pass, nats, mean over members; SURF's of all passes, with its
+    /// crops.
     pub loss: f32,
-    /// Share that was right during the last pass, mean over members; equal preferences, which
-    /// cannot be right, are left out.
+    /// Share that was right during the same, mean over members; equal preferences, which cannot be
+    /// right, are left out.
     pub accuracy: f32,
 }
 
@@ -230,6 +231,7 @@ impl RewardEnsemble {
             }
         }
         let variance: f64 = squares / n - (sum / n) * (sum / n);
+        self.scale = Scale::NONE;
         if self.config.normalized_std > 0.0 && variance > LEAST_VARIANCE {
             self.scale = Scale {
                 offset: sum / n,

@@ -298,6 +298,7 @@ impl Checks {
     /// The largest difference between two lists of the same length.
     fn numbers(&mut self, field: &'static str, ours: &[f64], theirs: &[f64], tolerance: f64) {
         let differences = ours.iter().zip(theirs).map(|(a, b)| (a - b).abs());
+        let differences = differences.map(or_infinite);
         self.checks.push(Check {
             field,
             error: differences.fold(0.0, f64::max),
@@ -321,6 +322,11 @@ impl Checks {
             tolerance: 0.0,
         });
     }
+}
+
+/// What is no number is as wrong as can be, where a maximum would pass over it.
+fn or_infinite(error: f64) -> f64 {
+    if error.is_nan() { f64::INFINITY } else { error }
 }
 
 #[cfg(test)]

@@ -25,7 +25,8 @@ use crate::writer::Transaction;
 /// How a labeler came to an answer.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Timing {
-    /// From the first frame of both clips to the key while the page was visible, milliseconds.
+    /// From the first frame of both clips to the key while the page was visible and no dialog lay
+    /// over them, milliseconds.
     pub visible_ms: Option<u32>,
     /// While it was hidden, milliseconds.
     pub hidden_ms: Option<u32>,
@@ -80,6 +81,8 @@ struct Leased {
     query: QueryId,
     left_is: Which,
     state: String,
+    /// Of a stage question whose pair was skipped.
+    is_withdrawn: bool,
 }
 
 impl Store {
@@ -91,8 +94,8 @@ impl Store {
     /// # Errors
     /// [`StoreError::Missing`], [`StoreError::NotYours`], [`StoreError::WrongQuestion`],
     /// [`StoreError::NoReason`], [`StoreError::Different`], [`StoreError::NotSupersedable`];
-    /// [`StoreError::Taken`] and, for a study that is closed, [`StoreError::StudyState`], where
-    /// the answer is kept aside.
+    /// [`StoreError::Taken`], [`StoreError::Withdrawn`] and, for a study that is closed,
+    /// [`StoreError::StudyState`], where the answer is kept aside.
     pub async fn answer(
         &self,
         lease: &str,
@@ -121,6 +124,10 @@ impl Store {
                 if leased.state == "taken" && is_elsewhere(t, &leased).await? {
                     keep_aside(t, &leased, labeler, &answer).await?;
                     return Ok(Err(StoreError::Taken));
+                }
+                if leased.is_withdrawn {
+                    keep_aside(t, &leased, labeler, &answer).await?;
+                    return Ok(Err(StoreError::Withdrawn));
                 }
                 insert(t, &leased, labeler, pressed, &answer).await.map(Ok)
             })
@@ -185,6 +192,7 @@ pub(crate) async fn skip_by_server(
         query,
         left_is: Which::First,
         state: "open".into(),
+        is_withdrawn: false,
     };
     let answer = NewAnswer {
         pressed: "skip".into(),
@@ -209,7 +217,7 @@ async fn find_lease(
 ) -> Result<Leased, StoreError> {
     let row = sqlx::query(
         "select lease.labeler_id, lease.question_id, question.kind, question.run_id, question.query_id,
-            lease.left_is, lease.state
+            lease.left_is, lease.state, question.state = 'withdrawn'
          from lease join question on question.id = lease.question_id where lease.id = ?",
     )
     .bind(lease)
@@ -227,6 +235,7 @@ async fn find_lease(
         query: QueryId(row.try_get(4)?),
         left_is: which(row.try_get(5)?),
         state: row.try_get(6)?,
+        is_withdrawn: row.try_get(7)?,
     })
 }
 
@@ -462,3 +471,6 @@ fn read(row: &SqliteRow) -> Result<StoredAnswer, StoreError> {
         is_new: false,
     })
 }
+
+#[cfg(test)]
+mod tests;

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use domain::query::QueryKey;
 use sqlx::sqlite::SqliteError;
 
 use crate::answer::StoredAnswer;
@@ -78,6 +79,12 @@ pub enum StoreError {
     /// A row holds what no row should hold.
     #[error("the database holds something impossible: {0}")]
     Impossible(String),
+    /// A run asks about other segments than it asked about under the same number before: it fell back
+    /// to an earlier checkpoint and did not come the same way again.
+    #[error(
+        "the run asks about other segments than those that are stored as query {} of session {}, so their answers would count for the wrong pair; start a new run", .0.index, .0.session
+    )]
+    OtherSegments(QueryKey),
     /// The server is closing.
     #[error("the server is closing")]
     Closed,
@@ -136,6 +143,16 @@ pub enum StoreError {
     /// Somebody else took the lease; the answer is kept aside.
     #[error("the lease ran out and somebody else has the question now; the answer is kept aside")]
     Taken,
+    /// The stage question of a skipped pair; the answer is kept aside.
+    #[error(
+        "the pair was skipped, so its stages are not asked about any more; the answer is kept aside"
+    )]
+    Withdrawn,
+    /// A name that is not a person's to take.
+    #[error(
+        "'{0}' is a name that this server keeps for itself, for the programs that answer or for those who were invited to a study; choose another name"
+    )]
+    NameKept(String),
 }
 
 fn left(most: u32, invited: u32) -> String {

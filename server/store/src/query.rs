@@ -69,7 +69,7 @@ impl Store {
     /// Keeps queries that a run asks. Those that are kept already stay as they are.
     ///
     /// # Errors
-    /// When they cannot be stored; none of them is.
+    /// When they cannot be stored, or other segments are kept for one; none of them is.
     pub async fn offer(
         &self,
         run: RunId,
@@ -264,7 +264,7 @@ async fn add(
     clip_state: &str,
 ) -> Result<(), StoreError> {
     let Some(id) = add_query(t, run, query, clip_state).await? else {
-        return Ok(());
+        return check_alike(t, run, query).await;
     };
     let kinds: &[&str] = if query.asks_same_stage {
         &["preference", "same_stage"]
@@ -307,6 +307,38 @@ pub(crate) async fn add_query(
     Ok(Some(id))
 }
 
+/// Whether what is kept under a query's key is that query.
+async fn check_alike(
+    t: &mut Transaction<'_>,
+    run: RunId,
+    query: &OfferedQuery,
+) -> Result<(), StoreError> {
+    let rows = sqlx::query(
+        "select which, episode, start, len, poses from query_segment
+         where query_id = (select id from query where run_id = ? and session = ? and position = ?)",
+    )
+    .bind(run.0)
+    .bind(query.key.session)
+    .bind(query.key.index)
+    .fetch_all(&mut *t.connection)
+    .await?;
+    for row in rows {
+        let record = match which(row.try_get(0)?) {
+            Which::First => &query.first,
+            Which::Second => &query.second,
+        };
+        let (kept, segment) = (
+            (row.try_get(1)?, row.try_get(2)?, row.try_get(3)?),
+            record.segment,
+        );
+        let poses: Vec<u8> = row.try_get(4)?;
+        if kept != (segment.episode.0, segment.start, segment.len) || poses != pose_bytes(record) {
+            return Err(StoreError::OtherSegments(query.key));
+        }
+    }
+    Ok(())
+}
+
 pub(crate) async fn ask(
     t: &mut Transaction<'_>,
     run: RunId,
@@ -328,12 +360,6 @@ async fn add_segment(
     which: Which,
     record: &SegmentRecord,
 ) -> Result<(), StoreError> {
-    let poses: Vec<u8> = record
-        .poses
-        .iter()
-        .flatten()
-        .flat_map(|x| x.to_le_bytes())
-        .collect();
     let task_rewards: Vec<u8> = record
         .task_rewards
         .iter()
@@ -348,12 +374,17 @@ async fn add_segment(
     .bind(record.segment.episode.0)
     .bind(record.segment.start)
     .bind(record.segment.len)
-    .bind(poses)
+    .bind(pose_bytes(record))
     .bind(task_rewards)
     .bind(&record.stages)
     .execute(&mut *t.connection)
     .await?;
     Ok(())
+}
+
+fn pose_bytes(record: &SegmentRecord) -> Vec<u8> {
+    let numbers = record.poses.iter().flatten();
+    numbers.flat_map(|x| x.to_le_bytes()).collect()
 }
 
 pub(crate) fn word(which: Which) -> &'static str {

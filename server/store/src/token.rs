@@ -5,7 +5,7 @@ use sqlx::Row as _;
 
 use crate::audit::{self, Deed};
 use crate::error::StoreError;
-use crate::labeler::{self, Labeler, LabelerId};
+use crate::labeler::{self, Labeler, LabelerId, name_of_program};
 use crate::run::RunId;
 use crate::secret::Secret;
 use crate::store::Store;
@@ -96,7 +96,7 @@ impl Store {
         let hash = secret.hash();
         self.write(move |t| {
             Box::pin(async move {
-                let id = labeler::find_or_add(t, &format!("program of run {run}")).await?;
+                let id = labeler::find_or_add_kept(t, &name_of_program(run)).await?;
                 sqlx::query("insert into token (hash, kind, labeler_id, run_id, created_at_ms) values (?, 'teacher', ?, ?, ?)")
                     .bind(hash)
                     .bind(id.0)

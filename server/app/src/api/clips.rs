@@ -1,7 +1,7 @@
 //! `/api/v1/clips`: the bytes of a clip, and a run's clips to look at.
 
 use axum::Json;
-use axum::extract::{Path, Request, State};
+use axum::extract::{Request, State};
 use axum::http::{HeaderValue, header};
 use axum::response::{IntoResponse as _, Response};
 use serde::Serialize;
@@ -10,7 +10,7 @@ use tower::ServiceExt as _;
 use tower_http::services::ServeFile;
 use utoipa::ToSchema;
 
-use crate::extract::Run;
+use crate::extract::{Path, Run};
 use crate::problem::Problem;
 use crate::state::AppState;
 

@@ -1,14 +1,14 @@
 //! `/api/v1/labelers`: who answers.
 
 use axum::Json;
-use axum::extract::{Query, State};
-use axum::http::{StatusCode, header};
+use axum::extract::State;
+use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Redirect, Response};
 use serde::{Deserialize, Serialize};
 use store::{Secret, TokenKind};
 use utoipa::ToSchema;
 
-use crate::extract::{ACCESS_COOKIE, Body, LABELER_COOKIE, set_cookie};
+use crate::extract::{Body, Cookie, Query};
 use crate::problem::Problem;
 use crate::state::AppState;
 
@@ -32,14 +32,15 @@ pub struct LabelerView {
 /// Says who answers in this browser; the reply sets a cookie.
 ///
 /// # Errors
-/// A name that is none.
+/// A name that is none, or that the server keeps for itself.
 #[utoipa::path(post, path = "/api/v1/labelers", tag = "labelers", request_body = NewLabeler,
     responses((status = 201, body = LabelerView), (status = 422, body = Problem)))]
 pub async fn create(
     State(app): State<AppState>,
+    headers: HeaderMap,
     Body(new): Body<NewLabeler>,
 ) -> Result<Response, Problem> {
-    let (cookie, view) = sign_in(&app, &new.name).await?;
+    let (cookie, view) = sign_in(&app, &headers, &new.name).await?;
     Ok((
         StatusCode::CREATED,
         [(header::SET_COOKIE, cookie)],
@@ -48,17 +49,21 @@ pub async fn create(
         .into_response())
 }
 
-/// The cookie for a browser whose labeler has this name.
+/// The cookie for the browser that asks, whose labeler has this name.
 ///
 /// # Errors
-/// A name that is none.
-pub async fn sign_in(app: &AppState, name: &str) -> Result<(String, LabelerView), Problem> {
+/// A name that is none, or that the server keeps for itself.
+pub async fn sign_in(
+    app: &AppState,
+    headers: &HeaderMap,
+    name: &str,
+) -> Result<(String, LabelerView), Problem> {
     let (labeler, secret) = app.store.sign_in(name).await?;
     let view = LabelerView {
         id: labeler.id.0,
         name: labeler.name,
     };
-    Ok((set_cookie(LABELER_COOKIE, &secret), view))
+    Ok((Cookie::Labeler.set(headers, &secret), view))
 }
 
 /// `?token=…`
@@ -70,15 +75,16 @@ pub struct Entrance {
 /// `GET /enter?token=…`: lets a browser use a server that listens on a network.
 ///
 /// # Errors
-/// A token that was never given out.
+/// No token, or one that was never given out.
 pub async fn enter(
     State(app): State<AppState>,
+    headers: HeaderMap,
     Query(entrance): Query<Entrance>,
 ) -> Result<Response, Problem> {
     let secret = Secret::brought(entrance.token);
     match app.store.bearer(&secret).await? {
         Some(bearer) if bearer.kind == TokenKind::Access => Ok((
-            [(header::SET_COOKIE, set_cookie(ACCESS_COOKIE, &secret))],
+            [(header::SET_COOKIE, Cookie::Access.set(&headers, &secret))],
             Redirect::to("/"),
         )
             .into_response()),

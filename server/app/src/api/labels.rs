@@ -1,7 +1,7 @@
 //! `/api/v1/runs/{id}/labels`: all answers, for statistics elsewhere.
 
 use axum::body::{Body, Bytes};
-use axum::extract::{Query, State};
+use axum::extract::State;
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde::Deserialize;
@@ -9,7 +9,7 @@ use store::LabelsOf;
 use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
 
-use crate::extract::Run;
+use crate::extract::{Query, Run};
 use crate::label_table::{self, TableError, TableFormat};
 use crate::problem::Problem;
 use crate::state::AppState;

@@ -1,7 +1,7 @@
 //! `/api/v1/leases`: questions to a labeler, and their answers.
 
 use axum::Json;
-use axum::extract::{Path, State};
+use axum::extract::State;
 use axum::http::StatusCode;
 use axum::response::{IntoResponse, Response};
 use domain::query::Question;
@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use store::{Lease, LeaseClip, NewAnswer, Progress, Queue, RunRow, Timing, now_ms, rfc3339};
 use utoipa::ToSchema;
 
-use crate::extract::{Answerer, Body, Run};
+use crate::extract::{Answerer, Body, Path, Run};
 use crate::problem::Problem;
 use crate::state::AppState;
 
@@ -93,7 +93,7 @@ pub struct QueueView {
 /// What the agent is doing.
 #[derive(Serialize, ToSchema)]
 pub struct PhaseView {
-    /// `exploring`, `asking`, `learning`, `evaluating`, `paused`.
+    /// `exploring`, `asking`, `learning`, `paused`.
     #[schema(value_type = String)]
     activity: Activity,
     /// Environment steps taken.
@@ -207,7 +207,8 @@ pub struct AnswerRequest {
 #[serde(deny_unknown_fields, default)]
 #[derive(Default)]
 pub struct TimingRequest {
-    /// From the first frame of both clips to the key while the page was visible, milliseconds.
+    /// From the first frame of both clips to the key while the page was visible and no dialog lay
+    /// over them, milliseconds.
     visible_ms: Option<f64>,
     /// While it was hidden, milliseconds.
     hidden_ms: Option<f64>,

@@ -1,13 +1,13 @@
 //! `/api/v1/queries`: ground truth for teachers' programs.
 
 use axum::Json;
-use axum::extract::{Path, State};
+use axum::extract::State;
 use domain::answer::Which;
 use serde::Serialize;
 use store::QueryId;
 use utoipa::ToSchema;
 
-use crate::extract::Answerer;
+use crate::extract::{Answerer, Path};
 use crate::problem::Problem;
 use crate::state::AppState;
 

@@ -4,6 +4,7 @@ use axum::Json;
 use axum::extract::State;
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
+use domain::teacher::TeacherSettings;
 use lab::config::{Layers, RunConfig};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -51,6 +52,10 @@ pub struct RunView {
     pub seed: u64,
     /// Who answers.
     pub teacher: String,
+    /// How irregular scripted teachers are to be in this run, as its settings `[teacher]` say; null
+    /// where this version of the program cannot read them.
+    #[schema(value_type = Object)]
+    pub teacher_settings: Option<TeacherSettings>,
     /// What it is doing.
     pub state: StateView,
     /// Environment steps taken.
@@ -205,7 +210,7 @@ pub async fn create_token(
     headers: axum::http::HeaderMap,
     Run(run): Run,
 ) -> Result<Response, Problem> {
-    use crate::extract::{LABELER_COOKIE, bearer, cookie};
+    use crate::extract::{bearer, labeler};
     let is_teacher = match bearer(&headers) {
         Some(secret) => {
             let kind = app.store.bearer(&secret).await?.map(|bearer| bearer.kind);
@@ -213,7 +218,7 @@ pub async fn create_token(
         }
         None => false,
     };
-    if is_teacher || cookie(&headers, LABELER_COOKIE).is_some() {
+    if is_teacher || labeler(&app, &headers).await?.is_some() {
         return Err(Problem::teachers_only());
     }
     let secret = app.store.add_teacher_token(run.id).await?;
@@ -298,7 +303,9 @@ pub async fn view(app: &AppState, run: RunRow) -> Result<RunView, Problem> {
     let (message, next) = line.map_or((run.state.message, run.state.next), |line| {
         (line.message, line.next)
     });
+    let settings = RunConfig::parse("the run's settings", &run.config);
     Ok(RunView {
+        teacher_settings: settings.ok().map(|config| config.teacher),
         id: run.id.0,
         task: run.task,
         method: run.method,

@@ -2,13 +2,13 @@
 
 use axum::Json;
 use axum::extract::State;
-use axum::http::{StatusCode, header};
+use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse as _, Response};
 use serde::{Deserialize, Serialize};
 use store::{Entered, Secret, StudyPlan, now_ms};
 use utoipa::ToSchema;
 
-use crate::extract::{Answerer, Body, LABELER_COOKIE, set_cookie};
+use crate::extract::{Answerer, Body, Cookie};
 use crate::live::parse_study;
 use crate::problem::Problem;
 use crate::state::AppState;
@@ -41,6 +41,7 @@ pub struct JoinedView {
     responses((status = 201, body = JoinedView), (status = 404, body = Problem), (status = 410, body = Problem), (status = 422, body = Problem)))]
 pub async fn join(
     State(app): State<AppState>,
+    headers: HeaderMap,
     Body(request): Body<JoinRequest>,
 ) -> Result<Response, Problem> {
     let (browser, return_code) = if is_return_code(&request.code) {
@@ -49,7 +50,7 @@ pub async fn join(
         let entered = enter(&app, &request.code, request.agrees).await?;
         (entered.browser, Some(shown(&entered.return_code)))
     };
-    let cookie = [(header::SET_COOKIE, set_cookie(LABELER_COOKIE, &browser))];
+    let cookie = [(header::SET_COOKIE, Cookie::Labeler.set(&headers, &browser))];
     let view = Json(JoinedView { return_code });
     Ok((StatusCode::CREATED, cookie, view).into_response())
 }

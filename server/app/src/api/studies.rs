@@ -1,7 +1,7 @@
 //! `/api/v1/studies`: prepare, look at, open, invite, close.
 
 use axum::Json;
-use axum::extract::{Path, Query, State};
+use axum::extract::State;
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse as _, Response};
 use domain::query::Question;
@@ -11,7 +11,7 @@ use store::{LabelsOf, NewStudy, Seat, Secret, StoreError, StudyId, StudyRow, now
 use utoipa::ToSchema;
 
 use super::labels::{Format, exported};
-use crate::extract::{Body, Study};
+use crate::extract::{Body, Path, Query, Study};
 use crate::live::parse_study;
 use crate::problem::Problem;
 use crate::state::AppState;

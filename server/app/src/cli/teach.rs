@@ -34,7 +34,8 @@ pub struct Args {
     /// The run's id, as its page's address has it
     #[arg(long, value_name = "ID")]
     run: String,
-    /// Who answers: oracle, mistaken, coin
+    /// Who answers, as irregular as the run's settings say: oracle, mistaken, inconsistent, myopic,
+    /// noisy, equal, skip, coin
     #[arg(long, default_value = "oracle")]
     teacher: String,
     /// A teacher token of the run [default: STAIR_TEACHER_TOKEN, or one that the server gives to
@@ -52,20 +53,28 @@ pub struct Args {
 /// [`super::BadInput`] for a server that cannot be reached, an unknown run or teacher, a wrong token;
 /// anything else that the server refuses.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
-    let settings = TeacherSettings::default();
-    super::train::judge(&args.teacher, 0, &settings)?; // a wrong name is said before anything is sent
+    let regular = TeacherSettings::default();
+    super::train::judge(&args.teacher, 0, &regular)?; // a wrong name is said before anything is sent
     let mut client = Client::new(&args.server, PATIENCE)?;
     let run = format!("/api/v1/runs/{}", path_segment(&args.run)?);
-    let told = client.get(&run)?;
-    let token = match args
+    let given = args
         .token
-        .or_else(|| std::env::var("STAIR_TEACHER_TOKEN").ok())
-    {
-        Some(token) => token,
-        None => new_token(&mut client, &run)?,
-    };
-    client.authorize(token);
+        .or_else(|| std::env::var("STAIR_TEACHER_TOKEN").ok());
+    let is_given = given.is_some();
+    if let Some(token) = given {
+        client.authorize(token); // first of all: some servers tell nothing without
+    }
+    let told = client.get(&run)?;
+    if !is_given {
+        let token = new_token(&mut client, &run)?;
+        client.authorize(token);
+    }
     let seed = args.seed.or(told["seed"].as_u64()).unwrap_or_default();
+    // As irregular as the run's settings say; a server of before they were told knows no others.
+    let settings: Option<TeacherSettings> =
+        serde_json::from_value(told["teacher_settings"].clone())
+            .context("the run's teacher settings are of another kind")?;
+    let settings = settings.unwrap_or(regular);
     let mut teacher = Remote {
         client,
         run,

@@ -24,6 +24,7 @@ use crate::provenance;
   stair train go-fetch-return --preset quick
   stair train window-open --method pebble --preset quick --labels 500 --seed 3
   stair train window-open --set feedback.queries_per_session=20 --json
+  stair train window-open --teacher mistaken --set teacher.mistake=0.2
   stair train --resume data/train/window-open-stair-1")]
 pub struct Args {
     /// The task; `stair tasks` lists them
@@ -44,9 +45,10 @@ pub struct Args {
     /// Of every random stream
     #[arg(long)]
     seed: Option<u64>,
-    /// Who answers: oracle, mistaken, inconsistent, myopic, noisy, equal, skip, coin
-    #[arg(long, default_value = "oracle")]
-    teacher: String,
+    /// Who answers: oracle, mistaken, inconsistent, myopic, noisy, equal, skip, coin [default:
+    /// oracle; with --resume whoever has answered so far]
+    #[arg(long)]
+    teacher: Option<String>,
     /// Answers in all
     #[arg(long)]
     labels: Option<u32>,
@@ -60,7 +62,9 @@ pub struct Args {
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Go on with the run in this folder
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["task", "config", "out", "settings", "preset"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = [
+        "task", "method", "preset", "config", "settings", "seed", "labels", "steps", "out",
+    ])]
     resume: Option<PathBuf>,
     /// No progress bar; one JSON object at the end
     #[arg(long)]
@@ -80,13 +84,20 @@ pub struct Args {
 )]
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let started = Instant::now();
-    let (mut run, folder) = open(&args)?;
+    let is_new = args.resume.is_none();
+    let wanted = args.teacher.as_deref().or(is_new.then_some("oracle"));
+    if let Some(name) = wanted {
+        judge(name, 0, &TeacherSettings::default())?; // a wrong name is said before anything is done
+    }
+    let (mut run, folder) = open(&args, wanted)?;
     let here = provenance::here(&run.config().device);
-    let (sitting, complaint) = Sitting::begin(&folder, &here, started)?;
+    let (mut sitting, complaint) = Sitting::begin(&folder, &here, started)?;
     if let Some(complaint) = complaint {
         eprintln!("{complaint}");
     }
-    let judge = judge(&args.teacher, run.config().seed, &run.config().teacher)?;
+    let teacher = sitting.answered_by(wanted).map_err(BadInput::from_error)?;
+    let judge = judge(teacher, run.config().seed, &run.config().teacher)?;
+    sitting.keep()?;
     let mut teacher = Scripted::new(judge, run.consumed_sequence());
     let (sender, commands) = channel();
     stop_when_told(sender, args.until_eof)?;
@@ -131,7 +142,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn open(args: &Args) -> anyhow::Result<(Run, PathBuf)> {
+fn open(args: &Args, teacher: Option<&str>) -> anyhow::Result<(Run, PathBuf)> {
     if let Some(folder) = &args.resume {
         let (run, complaints) =
             Run::resume_on(folder, args.device.as_deref()).map_err(BadInput::from_error)?;
@@ -149,7 +160,7 @@ fn open(args: &Args) -> anyhow::Result<(Run, PathBuf)> {
         .into()
     };
     let folder = args.out.clone().unwrap_or_else(named);
-    let run = Run::start(config, &folder).map_err(BadInput::from_error)?;
+    let run = Run::start_with(config, &folder, teacher).map_err(BadInput::from_error)?;
     Ok((run, folder))
 }
 

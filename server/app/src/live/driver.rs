@@ -90,7 +90,8 @@ impl Driver {
         let folder = self.inner.store.run_folder(self.run);
         if !Run::exists(&folder) {
             let config = RunConfig::parse("the run's settings", &row.config)?;
-            return Ok(Run::start(config, &folder)?);
+            let script = Some(row.teacher.as_str()).filter(|name| !is_over_http(name));
+            return Ok(Run::start_with(config, &folder, script)?);
         }
         let (run, complaints) = Run::resume(&folder)?;
         for complaint in complaints {

@@ -99,10 +99,6 @@ impl StateLine {
                     next,
                 )
             }
-            Activity::Evaluating => {
-                let message = format!("trying the policy at step {step} of {total}");
-                Self::of(StateKind::Training, message, "then trains on")
-            }
             Activity::Paused => Self::paused(phase.step, phase.total_steps),
         }
     }

@@ -47,8 +47,8 @@ fn prepare(inner: &Inner, id: StudyId) -> anyhow::Result<()> {
         inner
             .runtime
             .block_on(store.add_items(id, &study.tasks, items))?;
-        inner.clips.wake();
     }
+    inner.clips.wake(); // pairs wait to be drawn: new ones, or those of a preparation taken up again
     if !wait_for_clips(inner, id)? {
         return Ok(()); // the server is closing; the next one goes on
     }

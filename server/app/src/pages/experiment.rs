@@ -1,7 +1,7 @@
 //! `/experiments/{name}`: how far an experiment is, its curves and its tables.
 
 use askama::Template;
-use axum::extract::{Path, State};
+use axum::extract::State;
 use axum::http::{HeaderValue, header};
 use axum::response::{IntoResponse as _, Response};
 use lab::experiment::Artifact;
@@ -10,6 +10,7 @@ use super::experiments::state;
 use super::markdown::to_html;
 use super::{show, thousands};
 use crate::experiments::{self, Experiment, Running};
+use crate::extract::Path;
 use crate::problem::Problem;
 use crate::state::AppState;
 use crate::worker::in_worker;

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use askama::Template;
-use axum::extract::{Form, State};
+use axum::extract::State;
 use axum::response::{Redirect, Response};
 use lab::config::{Layers, RunConfig};
 use lab::cost::time_here;
@@ -13,6 +13,7 @@ use serde_json::{Map, json};
 use super::{show, thousands, title};
 use crate::api::runs::{self, RunRequest, RunView};
 use crate::assets;
+use crate::extract::Form;
 use crate::live::HUMAN;
 use crate::problem::Problem;
 use crate::state::AppState;

@@ -1,8 +1,8 @@
 //! `/join`: what a study asks of a labeler, their agreement, and the way back in.
 
 use askama::Template;
-use axum::extract::{Form, Query, State};
-use axum::http::{StatusCode, header};
+use axum::extract::State;
+use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse as _, Redirect, Response};
 use serde::Deserialize;
 use store::{LinkTrouble, Secret, StoreError, now_ms};
@@ -10,7 +10,7 @@ use store::{LinkTrouble, Secret, StoreError, now_ms};
 use super::markdown::to_html;
 use super::{show, title};
 use crate::api::seats;
-use crate::extract::{LABELER_COOKIE, set_cookie};
+use crate::extract::{Cookie, Form, Query};
 use crate::live::parse_study;
 use crate::problem::Problem;
 use crate::state::AppState;
@@ -106,14 +106,20 @@ fn turned_away(trouble: LinkTrouble) -> ReturnPage {
     }
 }
 
-/// For a browser in which nobody takes part: 404, with the place to enter a return code.
-pub(super) fn nobody_here() -> Response {
+/// For a browser in which nobody takes part: the place to enter a return code.
+///
+/// * `status` – 404, or 401 where a token of the server would open the page too
+pub fn nobody_here(status: StatusCode) -> Response {
+    let mut told = "You take part in no study in this browser. Open the link that you were sent, or come back with your return code.".to_owned();
+    if status == StatusCode::UNAUTHORIZED {
+        told += " If you were given this server's token instead, open /enter?token=… first.";
+    }
     let page = ReturnPage {
         heading: "Go on where you were",
-        told: "You take part in no study in this browser. Open the link that you were sent, or come back with your return code.".to_owned(),
+        told,
         can_go_on: false,
     };
-    (StatusCode::NOT_FOUND, show(&page)).into_response()
+    (status, show(&page)).into_response()
 }
 
 /// The code of a link, with the labeler's agreement.
@@ -130,10 +136,11 @@ pub struct EnterForm {
 /// No agreement; a store that cannot be written.
 pub async fn enter(
     State(app): State<AppState>,
+    headers: HeaderMap,
     Form(form): Form<EnterForm>,
 ) -> Result<Response, Problem> {
     let entered = seats::enter(&app, &form.code, form.agrees.is_some()).await?;
-    let cookie = set_cookie(LABELER_COOKIE, &entered.browser);
+    let cookie = Cookie::Labeler.set(&headers, &entered.browser);
     let page = show(&WelcomePage {
         return_code: seats::shown(&entered.return_code),
     });
@@ -152,11 +159,12 @@ pub struct ReturnForm {
 /// A store that cannot be written.
 pub async fn come_back(
     State(app): State<AppState>,
+    headers: HeaderMap,
     Form(form): Form<ReturnForm>,
 ) -> Result<Response, Problem> {
     match app.store.come_back(&Secret::typed(&form.code)).await {
         Ok(browser) => {
-            let cookie = [(header::SET_COOKIE, set_cookie(LABELER_COOKIE, &browser))];
+            let cookie = [(header::SET_COOKIE, Cookie::Labeler.set(&headers, &browser))];
             Ok((cookie, Redirect::to("/seat")).into_response())
         }
         Err(StoreError::Link(LinkTrouble::Unknown)) => Ok(show(&ReturnPage {

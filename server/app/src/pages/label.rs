@@ -1,8 +1,8 @@
 //! `/runs/{id}/label`: two clips, one question, single keys.
 
 use askama::Template;
-use axum::extract::{Form, State};
-use axum::http::{HeaderMap, header};
+use axum::extract::State;
+use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse as _, Redirect, Response};
 use domain::query::Question;
 use serde::Deserialize;
@@ -12,7 +12,7 @@ use super::guidance::{Guidance, guidance, guidance_with, text};
 use super::join::nobody_here;
 use super::{show, thousands, title};
 use crate::api::labelers;
-use crate::extract::{Run, labeler};
+use crate::extract::{Form, Run, labeler};
 use crate::live::parse_study;
 use crate::problem::Problem;
 use crate::state::AppState;
@@ -77,7 +77,7 @@ pub async fn page(
         });
         return match seat {
             Some((study, ..)) => Ok(show(&of_study(&run, &study)?)),
-            None => Ok(nobody_here()),
+            None => Ok(nobody_here(StatusCode::NOT_FOUND)),
         };
     }
     // Whoever was invited to a study says another name for anything else.
@@ -96,13 +96,15 @@ pub async fn page(
 /// `POST /runs/{id}/label`: the name, kept in a cookie for a year.
 ///
 /// # Errors
-/// A name of no or more than 80 letters; a run that does not exist.
+/// A name of no or more than 80 letters, or one that the server keeps for itself; a run that does
+/// not exist.
 pub async fn sign_in(
     State(app): State<AppState>,
     Run(run): Run,
+    headers: HeaderMap,
     Form(form): Form<NameForm>,
 ) -> Result<Response, Problem> {
-    let (cookie, _) = labelers::sign_in(&app, &form.name).await?;
+    let (cookie, _) = labelers::sign_in(&app, &headers, &form.name).await?;
     let to = Redirect::to(&format!("/runs/{}/label", run.id));
     Ok(([(header::SET_COOKIE, cookie)], to).into_response())
 }

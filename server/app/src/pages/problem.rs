@@ -53,13 +53,21 @@ pub async fn as_page(request: Request, next: Next) -> Response {
     }
 }
 
-/// Back to the run where it exists, and to the list of what was looked for otherwise.
+/// Back to the form where something else must be typed, to the run where it exists, and to the
+/// list of what was looked for otherwise.
 fn forward(path: &str, status: u16) -> (String, &'static str) {
     let mut parts = path.split('/').skip(1);
     match (parts.next(), parts.next(), parts.next()) {
+        (Some("runs"), Some(run), Some("label")) if status == 422 => {
+            (format!("/runs/{run}/label"), "Back to the name")
+        }
+        (Some("studies"), Some(study), Some(_)) if status != 404 => {
+            (format!("/studies/{study}"), "Back to the study")
+        }
         (Some("runs"), Some(run), Some(_)) if status != 404 => {
             (format!("/runs/{run}"), "Back to the run")
         }
+        (Some("join" | "seat"), _, _) => ("/join".to_owned(), "Enter a return code"),
         (Some("experiments"), Some(_), _) => ("/experiments".to_owned(), "Experiments"),
         _ => ("/".to_owned(), "Tasks and runs"),
     }
@@ -70,9 +78,17 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_name_that_is_not_taken_leads_back_to_where_it_was_typed() {
+        assert_eq!(forward("/runs/7/label", 422).0, "/runs/7/label");
+        assert_eq!(forward("/runs/7/label", 401).0, "/runs/7");
+        assert_eq!(forward("/join/return", 422).0, "/join");
+    }
+
+    #[test]
     fn a_command_that_failed_leads_back_to_its_run() {
         assert_eq!(forward("/runs/7/pause", 409).0, "/runs/7");
         assert_eq!(forward("/runs/7/pause", 404).0, "/");
+        assert_eq!(forward("/studies/3/invitations", 422).0, "/studies/3");
         assert_eq!(forward("/nowhere", 404).0, "/");
         assert_eq!(forward("/experiments/nowhere", 404).0, "/experiments");
     }

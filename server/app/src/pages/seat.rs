@@ -2,7 +2,7 @@
 
 use askama::Template;
 use axum::extract::State;
-use axum::http::HeaderMap;
+use axum::http::{HeaderMap, StatusCode};
 use axum::response::Response;
 use store::Part;
 
@@ -45,7 +45,7 @@ pub async fn page(State(app): State<AppState>, headers: HeaderMap) -> Result<Res
         None => None,
     };
     let Some((study, _, parts)) = seat else {
-        return Ok(nobody_here());
+        return Ok(nobody_here(StatusCode::NOT_FOUND));
     };
     let next = parts.iter().find(|part| !part.is_done);
     Ok(show(&SeatPage {

@@ -1,7 +1,7 @@
 //! `/studies`: every study, and those that come with the program.
 
 use askama::Template;
-use axum::extract::{Form, State};
+use axum::extract::State;
 use axum::response::{IntoResponse as _, Redirect, Response};
 use lab::study::{READY, StudyFile};
 use serde::Deserialize;
@@ -9,6 +9,7 @@ use store::StudyRow;
 
 use super::{show, thousands, title};
 use crate::api::studies;
+use crate::extract::Form;
 use crate::problem::Problem;
 use crate::state::AppState;
 

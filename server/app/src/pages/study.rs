@@ -1,7 +1,7 @@
 //! `/studies/{id}`: how far a study is, whom to invite, and what came out.
 
 use askama::Template;
-use axum::extract::{Form, State};
+use axum::extract::State;
 use axum::http::HeaderMap;
 use axum::response::{IntoResponse as _, Redirect, Response};
 use serde::Deserialize;
@@ -10,7 +10,7 @@ use store::{ItemLine, StudyRow};
 use super::studies::{message, question_words};
 use super::{show, title};
 use crate::api::studies::{self as api, DAYS, SeatView};
-use crate::extract::Study;
+use crate::extract::{Form, Study};
 use crate::live::parse_study;
 use crate::problem::Problem;
 use crate::state::AppState;
@@ -172,7 +172,8 @@ async fn filled_in(
     let tasks = file.tasks.iter().enumerate().map(|(number, name)| {
         let own = |item: &&ItemLine| item.task == number as u32 && item.role == "counted";
         let mut own: Vec<&ItemLine> = items.iter().filter(own).collect();
-        // By what their pictures hash to: their own order would tell one method from another.
+        // By what their pictures hash to: in studies that earlier versions prepared their own
+        // order tells one method from another.
         own.sort_by(|a, b| a.clips.cmp(&b.clips));
         let cell = |item: &&ItemLine| PairCell {
             n_answers: item.n_answers,

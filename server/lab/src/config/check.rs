@@ -7,6 +7,9 @@ use domain::sampler::{SAMPLERS, sampler};
 use super::{ConfigError, RunConfig, find_task, unknown};
 use crate::method;
 
+/// Pairs that a session may draw.
+const MOST_PAIRS: u64 = 10_000_000;
+
 /// Says what a value must be where it is not so.
 fn require(
     holds: bool,
@@ -95,9 +98,11 @@ impl RunConfig {
         not_zero([
             ("training.total_steps", t.total_steps),
             ("feedback.every", f.every),
-            ("evaluation.episodes", u64::from(self.evaluation.episodes)),
-            ("exploration.neighbours", self.exploration.neighbours as u64),
         ])?;
+        let trials = [("evaluation.episodes", self.evaluation.episodes)];
+        all_within(trials, &(1..=10_000), "from 1 to 10000")?;
+        let neighbours = [("exploration.neighbours", self.exploration.neighbours)];
+        all_within(neighbours, &(1..=1_000), "from 1 to 1000")?;
         require(
             f.first_step > t.seed_steps,
             "feedback.first_step",
@@ -121,6 +126,21 @@ impl RunConfig {
             ),
             ("queries.newest_episodes", q.newest_episodes as u64),
         ])?;
+        let session = u64::from(per_session.min(self.feedback.budget));
+        for (key, per_query) in [
+            ("queries.candidates_per_query", q.candidates_per_query),
+            (
+                "semi_supervised.unlabeled_per_query",
+                self.semi_supervised.unlabeled_per_query,
+            ),
+        ] {
+            require(
+                session * u64::from(per_query) <= MOST_PAIRS,
+                key,
+                &per_query,
+                "so few that a session has at most 10000000 of them",
+            )?;
+        }
         shares([("queries.same_stage_fraction", q.same_stage_fraction)])?;
         shares_above_0([("queries.sufficient_fraction", q.sufficient_fraction)])?;
         for (key, weight) in [
@@ -146,6 +166,15 @@ impl RunConfig {
             &q.segment_len,
             "at most an episode's length",
         )?;
+        // Whole episodes, of which one alone makes no pair.
+        let is_whole = self.segment_len(&spec) == self.episode_len(&spec);
+        for (key, n) in [
+            ("queries.newest_episodes", q.newest_episodes),
+            ("queries.near_policy_episodes", q.near_policy_episodes),
+        ] {
+            let must_be = "at least 2 where segments are whole episodes";
+            require(!is_whole || n > 1, key, &n, must_be)?;
+        }
         let episode_len = self.environment.episode_len;
         require(
             episode_len == 0 || (self.segment_len(&spec)..=spec.episode_len).contains(&episode_len),
@@ -247,6 +276,13 @@ impl RunConfig {
         discounts([("bonus.decay", b.decay)])?;
         let flip = [("denoising.flip_below", d.flip_below)];
         all_within(flip, &(1e-12..0.5), "above 0, below 0.5")?;
+        let reach = [
+            ("semi_supervised.margin", s.margin),
+            ("semi_supervised.crop_spread", s.crop_spread),
+        ];
+        all_within(reach, &(0..=1_000_000), "at most 1000000")?;
+        let ratio = [("semi_supervised.batch_ratio", s.batch_ratio)];
+        all_within(ratio, &(0..=1_000), "at most 1000")?;
         let certainty = [("semi_supervised.certainty", s.certainty)];
         all_within(certainty, &(0.5..1.0), "from 0.5 to below 1")?;
         not_negative([

@@ -43,6 +43,18 @@ fn a_task_that_does_not_know_its_stages_cannot_tell_them() {
     assert!(error.contains("does not know its own"), "{error}");
 }
 
+#[test]
+fn a_whole_episode_alone_makes_no_pair() {
+    let whole = "queries.segment_len=100"; // of go-fetch-return
+    assert!(RunConfig::resolve(&layers(&[], &[whole])).is_ok());
+    for key in ["queries.newest_episodes", "queries.near_policy_episodes"] {
+        let one = format!("{key}=1");
+        assert!(RunConfig::resolve(&layers(&[], &[&one])).is_ok());
+        let told = RunConfig::resolve(&layers(&[], &[whole, &one])).unwrap_err();
+        assert!(told.to_string().contains(key), "{told}");
+    }
+}
+
 /// ALGORITHMS.md 7: answers in all and in a session, steps between sessions, the first session.
 #[test]
 fn feedback_is_as_the_paper_gives_it_for_each_task() {
@@ -266,6 +278,14 @@ fn a_value_out_of_range_or_of_the_wrong_kind_is_refused() {
         "temporal.max_gradient_norm=0.0",
         "steering.every=0",
         "exploration.neighbours=0",
+        "exploration.neighbours=1000000000000",
+        "evaluation.episodes=0",
+        "evaluation.episodes=4294967295",
+        "queries.candidates_per_query=4294967295",
+        "semi_supervised.unlabeled_per_query=4294967295",
+        "semi_supervised.margin=4294967295",
+        "semi_supervised.crop_spread=4294967295",
+        "semi_supervised.batch_ratio=1000000000000",
         "queries.coefficients.stage=nan",
     ] {
         let error = RunConfig::resolve(&layers(&[], &[bad])).unwrap_err();

@@ -71,18 +71,12 @@ impl RunKey {
     /// Setting and teacher as figures and tables show them; empty for the plain setting under
     /// the oracle.
     pub fn shown_setting(&self) -> String {
-        let parts = [self.setting.as_str(), self.shown_teacher()];
-        let parts: Vec<&str> = parts.into_iter().filter(|part| !part.is_empty()).collect();
-        parts.join(", ")
+        shown_setting(&self.setting, &self.teacher)
     }
 
     /// The teacher; empty for the oracle, who goes without saying.
     pub fn shown_teacher(&self) -> &str {
-        if self.teacher == "oracle" {
-            ""
-        } else {
-            &self.teacher
-        }
+        shown_teacher(&self.teacher)
     }
 }
 
@@ -94,6 +88,17 @@ pub fn setting_names(source: GridText) -> Vec<String> {
         .into_iter()
         .map(|setting| setting.name.into_inner());
     names.collect()
+}
+
+/// Setting and teacher in words, as [`RunKey::shown_setting`] says.
+pub(crate) fn shown_setting(setting: &str, teacher: &str) -> String {
+    let parts = [setting, shown_teacher(teacher)];
+    let parts: Vec<&str> = parts.into_iter().filter(|part| !part.is_empty()).collect();
+    parts.join(", ")
+}
+
+fn shown_teacher(teacher: &str) -> &str {
+    if teacher == "oracle" { "" } else { teacher }
 }
 
 /// A setting's name as folders have it.

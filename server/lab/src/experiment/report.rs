@@ -219,6 +219,7 @@ fn evaluation_rows(runs: &[&RunResult]) -> Vec<CurveRow> {
             method: key.method.clone(),
             seed: key.seed,
             setting: setting.clone(),
+            teacher: String::new(), // the setting tells it
             step: e.step,
             labels: e.labels,
             success_rate: e.success_rate,
@@ -247,6 +248,7 @@ fn budget_rows(runs: &[&RunResult]) -> Vec<CurveRow> {
         method: run.key.method.clone(),
         seed: run.key.seed,
         setting: run.key.shown_teacher().to_owned(),
+        teacher: String::new(), // the setting tells it
         step: u64::from(run.end.budget),
         labels: run.end.budget,
         success_rate: score(run).value,

@@ -47,6 +47,12 @@ pub enum Content {
         reason: String,
         /// Of the program.
         revision: String,
+        /// Processor and cores of the machine; empty in rows of the program's earlier revisions.
+        #[serde(default)]
+        machine: String,
+        /// The resolved settings; empty in rows of the program's earlier revisions.
+        #[serde(default)]
+        config: toml::Table,
     },
 }
 

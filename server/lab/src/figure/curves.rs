@@ -12,12 +12,13 @@ use super::{
     Center, CurveRow, FigureEntry, FigureError, Request, choose, make_center, read_rows,
     shown_method,
 };
+use crate::experiment::grid::shown_setting;
 use crate::method::METHODS;
 
 pub(super) const ENTRY: FigureEntry = FigureEntry {
     name: "curves",
     summary: "learning curves by task and method, every seed thin behind their mean",
-    input: "task, method, seed, setting, step, labels, success_rate, return_mean, wall_s; or the folders of runs",
+    input: "task, method, seed, setting, teacher, step, labels, success_rate, return_mean, wall_s; or the folders of runs",
     choices: &["x", "y", "center"],
     make,
 };
@@ -68,7 +69,10 @@ impl Plan {
             is_rate: request.y != Some("return_mean"),
         };
         let center = make_center(request.center)?;
-        let rows: Vec<CurveRow> = read_rows(&ENTRY, request.sources)?;
+        let mut rows: Vec<CurveRow> = read_rows(&ENTRY, request.sources)?;
+        for row in &mut rows {
+            row.setting = shown_setting(&row.setting, &row.teacher);
+        }
         Ok(Self {
             axes,
             center,

@@ -18,6 +18,9 @@ pub struct CurveRow {
     /// What else differs between groups of runs; may be empty.
     #[serde(default)]
     pub setting: String,
+    /// Who answered, where that is told apart from the setting; may be empty.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub teacher: String,
     /// Environment steps taken.
     pub step: u64,
     /// Answers so far, skips not counted.
@@ -56,6 +59,7 @@ pub fn rows_of_run(config: &RunConfig, name: &str, metrics: &str) -> Result<Stri
             method: config.method.clone(),
             seed: config.seed,
             setting: String::new(),
+            teacher: String::new(),
             step: evaluation.step,
             labels: evaluation.labels,
             success_rate: evaluation.success_rate,

@@ -10,7 +10,7 @@ pub(crate) fn rime(config: &RunConfig) -> Method {
     Method {
         reward_learner: |config| {
             let feedback = &config.feedback;
-            let n_sessions = feedback.budget.div_ceil(feedback.queries_per_session);
+            let n_sessions = f64::from(feedback.budget) / f64::from(feedback.queries_per_session);
             Box::new(Denoising::new(&config.denoising, n_sessions))
         },
         ..pebble(config)

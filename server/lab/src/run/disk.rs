@@ -1,14 +1,16 @@
 //! A run's beginning, its checkpoints, and the way back from them.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use learn::checkpoint::Archive;
 use learn::device::Device;
-use learn::replay::{Replay, ReplayMark};
+use learn::replay::{Replay, ReplayMark, forget_others};
 
 use super::{Progress, Run, RunError};
 use crate::config::{RunConfig, find_task};
 use crate::folder::RunFolder;
+use crate::history::RunHistory;
 use crate::lanes::{Lanes, LanesState};
 use crate::learner::Learner;
 use crate::memory::{self, MemoryNeed, shape};
@@ -23,6 +25,19 @@ impl Run {
     /// # Errors
     /// [`RunError`]; nothing is started.
     pub fn start(config: RunConfig, folder: &Path) -> Result<Self, RunError> {
+        Self::start_with(config, folder, None)
+    }
+
+    /// The same for a run that a scripted teacher answers, which its folder tells from the first
+    /// moment on ([`RunHistory::teacher`]).
+    ///
+    /// # Errors
+    /// [`RunError`]; nothing is started.
+    pub fn start_with(
+        config: RunConfig,
+        folder: &Path,
+        teacher: Option<&str>,
+    ) -> Result<Self, RunError> {
         let task = find_task(&config.task)?;
         let spec = (task.spec)();
         let method = method::build(&config)?;
@@ -36,7 +51,8 @@ impl Run {
             replay.keep_disagreement();
         }
         let lanes = Lanes::start(task, &config, &mut replay);
-        let folder = RunFolder::create(folder)?;
+        let root = folder;
+        let folder = RunFolder::create(root)?;
         let mut run = Self {
             task,
             spec,
@@ -45,7 +61,9 @@ impl Run {
             lanes,
             replay,
             learner,
+            marks: BTreeMap::new(),
             preferences: Preferences::default(),
+            early: Vec::new(),
             session: None,
             progress: Progress::default(),
             meter: Meter::default(),
@@ -54,6 +72,7 @@ impl Run {
             config,
         };
         run.checkpoint()?;
+        RunHistory::begin(root, teacher)?;
         run.folder.seal(&run.config.to_toml())?;
         Ok(run)
     }
@@ -63,8 +82,8 @@ impl Run {
         RunFolder::holds_run(folder)
     }
 
-    /// Takes a run up again from its newest checkpoint that can be read. Returns what was
-    /// wrong with newer ones, for the person who reads the log.
+    /// Takes a run up again from its newest checkpoint that can be read. Newer ones are set aside;
+    /// returns what was wrong with them, for the person who reads the log.
     ///
     /// # Errors
     /// [`RunError`]; nothing is changed.
@@ -83,7 +102,7 @@ impl Run {
             device.clone_into(&mut config.device);
         }
         Device::open(&config.device)?; // before a checkpoint could be blamed for it
-        let mut complaints = Vec::new();
+        let (mut complaints, mut damaged) = (Vec::new(), Vec::new());
         let steps = run_folder.checkpoints()?;
         let mut run_folder = Some(run_folder);
         for step in steps.into_iter().rev() {
@@ -92,10 +111,16 @@ impl Run {
                 None => RunFolder::open(folder)?.0,
             };
             match Self::restore(config.clone(), opened, step) {
-                Ok(run) => return Ok((run, complaints)),
+                Ok(run) => {
+                    for step in damaged {
+                        run.folder.set_aside(step)?;
+                    }
+                    return Ok((run, complaints));
+                }
                 Err(error @ RunError::OtherSettings { .. }) => return Err(error),
                 Err(error) => complaints.push(format!("checkpoint of step {step}: {error}")),
             }
+            damaged.push(step);
         }
         let reasons = if complaints.is_empty() {
             "there is none".into()
@@ -141,8 +166,12 @@ impl Run {
         if method.bonus.is_some() {
             replay.keep_disagreement(); // an empty column says nothing about itself
         }
+        let mut marks: BTreeMap<u64, ReplayMark> = archive.json_or_default("earlier_marks")?;
+        marks.insert(step, mark);
         folder.cut_metrics(archive.json("metrics_len")?)?;
         Ok(Self {
+            marks,
+            early: archive.json_or_default("early_answers")?,
             preferences: archive.json("preferences")?,
             session: archive.json("session")?,
             progress: archive.json("progress")?,
@@ -182,12 +211,21 @@ impl Run {
         self.learner.save(&mut archive);
         archive.put_json("config", &self.config.to_toml());
         archive.put_json("lanes", &self.lanes.state());
-        archive.put_json("replay", &self.replay.sync(&self.folder.replay())?);
+        let (step, mark) = (self.progress.step, self.replay.sync(&self.folder.replay())?);
+        self.marks.remove(&step);
+        archive.put_json("replay", &mark);
+        archive.put_json("earlier_marks", &self.marks);
         archive.put_json("preferences", &self.preferences);
+        archive.put_json("early_answers", &self.early);
         archive.put_json("session", &self.session);
         archive.put_json("progress", &self.progress);
         archive.put_json("metrics_len", &self.folder.sync_metrics()?);
-        self.folder.save(self.progress.step, &archive)
+        self.folder.save(step, &archive)?;
+        let there = self.folder.checkpoints()?;
+        self.marks.insert(step, mark);
+        self.marks.retain(|step, _| there.contains(step));
+        forget_others(&self.folder.replay(), self.marks.values());
+        Ok(())
     }
 
     pub(super) fn leave_policy(&self) -> Result<(), RunError> {

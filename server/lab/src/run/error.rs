@@ -57,6 +57,28 @@ pub enum RunError {
         /// Where.
         folder: PathBuf,
     },
+    /// A new run where there is one without its settings.
+    #[error(
+        "{} has no config.toml but holds {found}, which a run left there; put its config.toml back to go on with it, or choose another folder", folder.display()
+    )]
+    Remains {
+        /// Where.
+        folder: PathBuf,
+        /// What is there.
+        found: String,
+    },
+    /// A file that has lost some of what a checkpoint knows of it.
+    #[error(
+        "{} has {found} bytes, and {expected} belong to the checkpoint; put the whole file back", path.display()
+    )]
+    CutShort {
+        /// The file.
+        path: PathBuf,
+        /// Its length.
+        found: u64,
+        /// The length that it had.
+        expected: u64,
+    },
     /// No run where one should be.
     #[error("{folder} holds no run: there is no config.toml in it")]
     NoRun {

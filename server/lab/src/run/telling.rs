@@ -1,7 +1,5 @@
 //! What a run says of itself: evaluations, demonstrations, its phase, its end.
 
-use domain::schedule::Every;
-
 use super::{Outcome, Run, RunError};
 use crate::evaluate::{Trial, correlation, evaluate};
 use crate::message::{Activity, Demonstration, Evaluation, Event, Finished, Phase};
@@ -13,6 +11,7 @@ impl Run {
     pub(super) fn evaluate(&mut self, events: &mut dyn FnMut(Event)) -> Result<(), RunError> {
         let trial = self.trial(self.config.evaluation.episodes)?;
         self.progress.last_evaluation = Some((trial.success_rate(), trial.return_mean()));
+        self.progress.evaluated_at = Some(self.progress.step);
         let event = Event::Evaluation(Evaluation {
             step: self.progress.step,
             labels: self.preferences.n_preferred(),
@@ -60,13 +59,13 @@ impl Run {
     }
 
     pub(super) fn finish(&mut self, events: &mut dyn FnMut(Event)) -> Result<Outcome, RunError> {
-        let every = Every(self.config.evaluation.every);
-        let step = self.progress.step;
-        let was_due = every.is_crossed(step.saturating_sub(self.lanes.len() as u64), step);
-        if !was_due || self.progress.last_evaluation.is_none() {
+        if self.progress.evaluated_at != Some(self.progress.step) {
             self.evaluate(events)?;
         }
-        self.demonstrate(None, events)?;
+        let is_said = std::mem::replace(&mut self.progress.is_finished, true);
+        if !is_said {
+            self.demonstrate(None, events)?;
+        }
         let (success_rate, return_mean) = self.progress.last_evaluation.unwrap_or_default();
         let finished = Finished {
             step: self.progress.step,
@@ -75,9 +74,11 @@ impl Run {
             return_mean,
             weights: self.learner.fingerprint(),
         };
-        self.leave_policy()?;
-        self.say(Event::Finished(finished.clone()), events)?;
-        self.checkpoint_and_say(events)?;
+        if !is_said {
+            self.leave_policy()?;
+            self.say(Event::Finished(finished.clone()), events)?;
+            self.checkpoint_and_say(events)?;
+        }
         Ok(Outcome::Finished(finished))
     }
 
@@ -114,7 +115,7 @@ impl Run {
             .map_or(0, |last| feedback.step_of(last));
         let next = feedback.step_of(n_sessions);
         let asks_again = self.method.sampler.is_some()
-            && self.preferences.n_preferred() < feedback.budget
+            && self.has_budget()
             && next < self.config.training.total_steps;
         let until = if asks_again {
             next

@@ -4,7 +4,9 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::mpsc::channel;
 
-use domain::teacher::{Oracle, Scripted};
+use domain::answer::Preference;
+use domain::query::OfferedQuery;
+use domain::teacher::{Judge, Oracle, Scripted};
 use learn::exploration::Novelty;
 
 use super::*;
@@ -22,6 +24,10 @@ struct Trained {
 impl Trained {
     /// To its end: 3 sessions of 4 at steps 300, 450 and 600.
     fn new(method: &str, more: &[&str]) -> Self {
+        Self::taught_by(Box::new(Oracle), method, more)
+    }
+
+    fn taught_by(judge: Box<dyn Judge>, method: &str, more: &[&str]) -> Self {
         let settings = [
             "training.total_steps=700",
             "training.seed_steps=100",
@@ -48,7 +54,7 @@ impl Trained {
         let _ = std::fs::remove_dir_all(&folder); // an earlier test run may have been killed
         let mut run = Run::start(config.expect("settings"), &folder).expect("a run");
         let (_commands, receiver) = channel();
-        let mut teacher = Scripted::new(Box::new(Oracle), 0);
+        let mut teacher = Scripted::new(judge, 0);
         let outcome = run.drive(&mut teacher, &receiver, &mut |_| {});
         assert!(matches!(outcome, Ok(Outcome::Finished(_))), "{outcome:?}");
         Self { run, folder }
@@ -59,6 +65,12 @@ impl Drop for Trained {
     fn drop(&mut self) {
         let _ = std::fs::remove_dir_all(&self.folder); // best effort: it is a temporary folder
     }
+}
+
+#[test]
+fn a_run_without_random_steps_learns_from_its_first_transition_on() {
+    let trained = Trained::new("sac", &["training.seed_steps=0", "training.total_steps=20"]);
+    assert_eq!(trained.run.step(), 20);
 }
 
 #[test]
@@ -105,6 +117,35 @@ fn qpa_asks_about_the_newest_episodes_and_trains_on_them_until_its_budget_is_spe
     let pebble = Trained::new("pebble", &more);
     assert_eq!(pebble.run.batches(700).recent, None);
     assert_eq!(pebble.run.pool().newest_episodes, 100);
+}
+
+#[test]
+fn the_released_codes_slips_in_drawing_pairs_are_the_runs_when_it_wants_them() {
+    let drawn = |more: &[&str]| {
+        let pool = Trained::new("pebble", more).run.pool();
+        (pool.leaves_last_start, pool.pairs_with_itself)
+    };
+    assert_eq!(drawn(&[]), (false, false));
+    assert_eq!(drawn(&["queries.bpref_starts=true"]), (true, false));
+    assert_eq!(drawn(&["queries.bpref_pairs=true"]), (false, true));
+}
+
+/// Cannot tell, whatever it sees.
+struct SkipsAll;
+
+impl Judge for SkipsAll {
+    fn judge(&self, _query: &OfferedQuery) -> Option<Preference> {
+        None
+    }
+}
+
+/// Nobody answers a single query: all are skipped, and there is nothing to steer by.
+#[test]
+fn mrn_goes_on_where_every_query_is_skipped() {
+    let more = ["steering.every=50", "queries.bpref_skips=true"];
+    let trained = Trained::taught_by(Box::new(SkipsAll), "mrn", &more);
+    assert_eq!(trained.run.preferences.n_preferred(), 0);
+    assert_eq!(trained.run.n_spent(), 12);
 }
 
 #[test]

@@ -16,7 +16,8 @@ use super::{
     spread,
 };
 
-/// Keys of [`Stream::Study`] from here on draw segments; smaller ones lay out labelers' turns.
+/// Keys of [`Stream::Study`] from here on draw a task's counted pairs, or their order where
+/// methods chose them; smaller ones lay out labelers' turns.
 const FIRST_KEY: u64 = 1 << 32;
 
 /// Why a pair is in a study.
@@ -173,7 +174,9 @@ fn counted(
     }
 }
 
-/// As many queries of every method's run, spread over the run, as the method chose them.
+/// As many queries of every method's run, spread over the run, as the method chose them; in an
+/// order that says nothing about methods, for pairs are numbered by it, and answers are exported
+/// with these numbers while the study is open.
 fn query_pairs(
     study: &StudyFile,
     (task, number): (&Task, usize),
@@ -216,7 +219,9 @@ fn query_pairs(
             });
         }
     }
-    Ok(pairs)
+    let mut rng = Rng::new(study.seed.into(), Stream::Study, FIRST_KEY + number as u64);
+    let order = rng.permutation(pairs.len());
+    Ok(order.into_iter().map(|at| pairs[at].clone()).collect())
 }
 
 /// What can be seen of a segment; its task rewards are not kept in a query set.
@@ -334,10 +339,11 @@ mod tests {
     use crate::study::READY;
 
     fn demo() -> StudyFile {
-        let (name, text) = READY
-            .iter()
-            .find(|(name, _)| *name == "task-1-demo")
-            .unwrap();
+        ready("task-1-demo")
+    }
+
+    fn ready(wanted: &str) -> StudyFile {
+        let (name, text) = READY.iter().find(|(name, _)| *name == wanted).unwrap();
         StudyFile::parse(name, text, Path::new("")).unwrap()
     }
 
@@ -373,6 +379,38 @@ mod tests {
             assert!(!seen.contains(&record.segment), "{:?}", record.segment);
             seen.push(record.segment);
         }
+    }
+
+    /// The numbers of the methods of all counted pairs of a task, in the order of the pairs.
+    fn methods(pairs: &[PlannedPair], task: usize) -> Vec<usize> {
+        let of_task = pairs.iter().filter(|pair| pair.task == task);
+        let method = |pair: &PlannedPair| match pair.role {
+            PairRole::Counted { method } => method,
+            _ => None,
+        };
+        of_task.filter_map(method).collect()
+    }
+
+    #[test]
+    fn the_place_of_a_pair_does_not_tell_the_method_that_chose_it() {
+        let study = ready("task-2");
+        let pairs = plan(&study, Path::new("")).unwrap();
+        let half = study.labels_per_task as usize / 2;
+        let tasks = 0..study.tasks.len();
+        let mut orders: Vec<Vec<usize>> = tasks.map(|task| methods(&pairs, task)).collect();
+        for order in &orders {
+            let n_first = |order: &[usize]| order.iter().filter(|method| **method == 0).count();
+            assert_eq!((n_first(order), order.len()), (half, 2 * half));
+            let early = n_first(&order[..half]);
+            assert!(early.abs_diff(half - early) < half / 2, "{order:?}");
+        }
+        orders.sort();
+        orders.dedup();
+        assert_eq!(orders.len(), study.tasks.len(), "each task has its own");
+        assert_eq!(pairs, plan(&study, Path::new("")).unwrap());
+        let seed = study.seed + 1;
+        let other = plan(&StudyFile { seed, ..study }, Path::new("")).unwrap();
+        assert_ne!(methods(&pairs, 0), methods(&other, 0));
     }
 
     #[test]

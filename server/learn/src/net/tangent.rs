@@ -10,7 +10,9 @@ impl Net {
     /// the same shape over another vector. The inner product of this with any output gradient is
     /// that of the weights' gradient with the direction.
     pub(crate) fn tangent(&self, input: &Tensor, direction: &Net) -> Tensor {
-        let mut x = self.stack.expanded(input);
+        // In the weights' own numbers, whatever those of other products are.
+        let kind = self.layers()[0].weight.kind();
+        let mut x = self.stack.expanded(input).to_kind(kind);
         let mut dx: Option<Tensor> = None;
         let last = self.layers().len() - 1;
         for (index, (layer, along)) in self.layers().iter().zip(direction.layers()).enumerate() {

@@ -15,8 +15,8 @@ use crate::error::LearnError;
 const JOURNAL: &str = "journal";
 const BEGIN: u8 = 0;
 const PUSH: u8 = 1;
-/// Reward columns kept: those of the last two checkpoints, and the one being written.
-const N_COLUMNS_KEPT: u64 = 3;
+/// What a file with a reward column is called, and then its number.
+const COLUMN: &str = "rewards-";
 
 /// What a checkpoint must remember to find its state of the replay again.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -83,7 +83,8 @@ impl Replay {
     ///
     /// What happened is appended to the journal; the reward column, which relabelling
     /// rewrites, goes whole into a file of its own (4 bytes a step), with the column of
-    /// disagreement where it is kept (as much again).
+    /// disagreement where it is kept (as much again). Earlier columns stay until
+    /// [`forget_others`] is told what is still needed.
     ///
     /// # Errors
     /// When the folder cannot be written; the replay then tries the same again.
@@ -101,9 +102,6 @@ impl Replay {
         let number = self.journal.n_columns + 1;
         write_durably(&column_path(folder, number), &self.column_bytes())?;
         self.journal.n_columns = number;
-        if let Some(old) = number.checked_sub(N_COLUMNS_KEPT) {
-            let _ = std::fs::remove_file(column_path(folder, old)); // no harm if it stays
-        }
         Ok(ReplayMark {
             journal_len: self.journal.len,
             journal_checksum: self.journal.checksum.value(),
@@ -280,6 +278,25 @@ impl Replay {
     }
 }
 
+/// Removes the reward columns of all but these marks from a replay's folder: only whoever keeps the
+/// checkpoints knows which of them are left. What cannot be removed stays and does no harm.
+pub fn forget_others<'a>(folder: &Path, marks: impl IntoIterator<Item = &'a ReplayMark>) {
+    let needed: Vec<PathBuf> = marks
+        .into_iter()
+        .map(|mark| column_path(folder, mark.column))
+        .collect();
+    let Ok(entries) = std::fs::read_dir(folder) else {
+        return;
+    };
+    for path in entries.filter_map(|entry| Some(entry.ok()?.path())) {
+        let name = path.file_name().and_then(|name| name.to_str());
+        let is_column = name.is_some_and(|name| name.starts_with(COLUMN));
+        if is_column && !needed.contains(&path) {
+            let _ = std::fs::remove_file(path);
+        }
+    }
+}
+
 /// Takes a record apart; `None` past the end.
 struct Reader<'a>(&'a [u8]);
 
@@ -311,7 +328,7 @@ fn put(bytes: &mut Vec<u8>, values: &[f32]) {
 }
 
 fn column_path(folder: &Path, number: u64) -> PathBuf {
-    folder.join(format!("rewards-{number}"))
+    folder.join(format!("{COLUMN}{number}"))
 }
 
 /// Cuts the file to `len` bytes, appends, and makes it durable.

@@ -100,10 +100,10 @@ impl TrustedMoments {
 }
 
 impl Denoising {
-    /// `n_sessions` are those that the budget pays for: the ensemble's rate rises from zero over
-    /// a third of their least epochs.
-    pub fn new(config: &DenoisingConfig, n_sessions: u32) -> Self {
-        let least = f64::from(n_sessions) * f64::from(config.least_epochs);
+    /// `n_sessions` are those that the budget pays for, the last one in part: the ensemble's rate
+    /// rises from zero over a third of their least epochs.
+    pub fn new(config: &DenoisingConfig, n_sessions: f64) -> Self {
+        let least = n_sessions * f64::from(config.least_epochs);
         Self {
             config: config.clone(),
             warm_up_epochs: (least / 3.0).round() as u64,
@@ -258,7 +258,7 @@ mod tests {
     use crate::device::Device;
     use crate::reward::RewardConfig;
 
-    fn denoising(n_sessions: u32) -> Denoising {
+    fn denoising(n_sessions: f64) -> Denoising {
         Denoising::new(&DenoisingConfig::default(), n_sessions)
     }
 
@@ -266,7 +266,7 @@ mod tests {
     /// v = var(0.1, 0.3, 2, 8) = 10.27, so −ln 0.8 + 0.4 + 3 = 3.623.
     #[test]
     fn everything_is_trusted_at_first_and_thresholds_close_in() {
-        let mut denoising = denoising(10);
+        let mut denoising = denoising(10.0);
         assert!((denoising.upper_threshold() - 6.907_755).abs() < 1e-5);
         assert!((denoising.lower_threshold() - 21.420_681).abs() < 1e-5);
         let divergences = [0.1, 0.3, 2.0, 8.0];
@@ -283,7 +283,7 @@ mod tests {
     /// β falls from 3 to 1 over 600 epochs; with v = 0.5 the term is 1.5, 1, 0.5.
     #[test]
     fn doubt_falls_with_the_epochs_and_the_rate_rises() {
-        let mut denoising = denoising(12);
+        let mut denoising = denoising(12.0);
         denoising.trusted.variance = 0.5;
         let mut term = |epoch| {
             denoising.n_epochs = epoch;
@@ -345,7 +345,7 @@ mod tests {
         let new = || RewardEnsemble::new(&config, 3, 2, 1, Device::CPU);
         let (mut plain, mut denoised) = (new(), new());
         plain.fit(&replay, &told);
-        denoising(1).fit(&mut denoised, &lesson);
+        denoising(1.0).fit(&mut denoised, &lesson);
         let (plain, denoised) = (share_right(&plain), share_right(&denoised));
         assert!(
             denoised > plain + 0.02,
@@ -391,11 +391,11 @@ mod tests {
             unlabeled: &[],
         };
         let new = || RewardEnsemble::new(&small(), 3, 2, 1, Device::CPU);
-        let (mut ensemble, mut whole, mut archive) = (new(), denoising(3), Archive::new());
+        let (mut ensemble, mut whole, mut archive) = (new(), denoising(3.0), Archive::new());
         whole.fit(&mut ensemble, &lesson);
         ensemble.save(&mut archive);
         whole.save(&mut archive);
-        let (mut other, mut resumed) = (new(), denoising(3));
+        let (mut other, mut resumed) = (new(), denoising(3.0));
         other.load(&archive).expect("loads");
         resumed.load(&archive).expect("loads");
         let expected = whole.fit(&mut ensemble, &lesson);

@@ -100,6 +100,7 @@ mod tests {
     use super::super::tests::{labeled, replay, small};
     use super::*;
     use crate::device::Device;
+    use crate::precision::Precision;
     use crate::replay::BatchRule;
     use crate::sac::SacConfig;
 
@@ -166,17 +167,23 @@ mod tests {
     }
 
     #[test]
-    fn steering_brings_the_critics_closer_to_the_answers() {
+    fn steering_brings_the_critics_closer_to_the_answers_whatever_products_are_made_of() {
         let replay = replay(6);
         let labeled = labeled(&replay, 14, |_| 5);
-        let (agent, mut ensemble) = (
-            Sac::new(&agent(false), 3, 2, 4, Device::CPU),
-            RewardEnsemble::new(&small(), 3, 2, 1, Device::CPU),
-        );
-        let batch = batch(&replay, 60);
-        let losses: Vec<f64> = (0..60)
-            .map(|_| ensemble.steer(&agent, &replay, &batch, &labeled, 0.1))
-            .collect();
-        assert!(losses[59] < losses[0], "{} {}", losses[0], losses[59]);
+        for precision in [Precision::F32, Precision::Bf16] {
+            let agent = SacConfig {
+                precision,
+                ..agent(false)
+            };
+            let (agent, mut ensemble) = (
+                Sac::new(&agent, 3, 2, 4, Device::CPU),
+                RewardEnsemble::new(&small(), 3, 2, 1, Device::CPU),
+            );
+            let batch = batch(&replay, 60);
+            let losses: Vec<f64> = (0..60)
+                .map(|_| ensemble.steer(&agent, &replay, &batch, &labeled, 0.1))
+                .collect();
+            assert!(losses[59] < losses[0], "{} {}", losses[0], losses[59]);
+        }
     }
 }

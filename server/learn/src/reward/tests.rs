@@ -241,7 +241,7 @@ fn every_way_to_fit_comes_to_rest() {
     };
     let fitters: [fn() -> Box<dyn RewardLearner>; 3] = [
         || Box::new(Supervised),
-        || Box::new(Denoising::new(&DenoisingConfig::default(), 1)),
+        || Box::new(Denoising::new(&DenoisingConfig::default(), 1.0)),
         || Box::new(SemiSupervised::new(&SemiSupervisedConfig::default(), 1)),
     ];
     for (index, fitter) in fitters.iter().enumerate() {

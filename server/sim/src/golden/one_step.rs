@@ -6,6 +6,7 @@
 
 use serde::Deserialize;
 
+use super::or_infinite;
 use crate::articulated::model::Model;
 use crate::articulated::simulation::Simulation;
 use crate::robots::quadruped::{self, N_MOTORS};
@@ -23,9 +24,8 @@ pub struct Errors {
 impl Errors {
     /// The largest; 0 without any.
     pub fn largest(&self) -> f64 {
-        self.errors
-            .iter()
-            .fold(0.0, |most: f64, error| most.max(*error))
+        let errors = self.errors.iter().copied().map(or_infinite);
+        errors.fold(0.0, f64::max)
     }
 
     /// The one in the middle; 0 without any.

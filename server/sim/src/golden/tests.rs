@@ -171,6 +171,18 @@ fn a_reset_shows_the_object_unless_the_original_shows_the_one_before() {
 }
 
 #[test]
+fn what_is_no_number_is_out_of_any_tolerance() {
+    let mut checks = Checks::new("a recording".into());
+    checks.numbers("reward", &[1.0, f64::NAN], &[1.0, 1.0], 10.0);
+    assert!(checks.checks[0].error > 10.0);
+    let errors = one_step::Errors {
+        name: "q0".into(),
+        errors: vec![0.1, f64::NAN],
+    };
+    assert!(errors.largest() > 0.1);
+}
+
+#[test]
 fn a_wrong_reward_and_a_wrong_success_are_found() {
     let line = a_transition();
     let mut value: serde_json::Value = serde_json::from_str(&line).expect("it is JSON");

@@ -5,7 +5,8 @@
 //! closer, and the weight of the links is carried by an extra torque, as in the original.
 //!
 //! Differs from the original: links collide as capsules of the volume of their hulls instead of
-//! as hulls, and not with each other.
+//! as hulls, and not with each other; weight and torque limits are reckoned once a control step, not
+//! every 2 ms, and what the links' own motion adds to their weight is not carried.
 //! Source: DMCONTROL_ROBODESK.md 5.1 and 5.2.
 
 use rapier3d::na::{Matrix3, SMatrix};

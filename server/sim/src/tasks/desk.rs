@@ -4,6 +4,10 @@
 //! Metres and kilograms; x right, y away from the robot, z up, the floor at z = 0, the table's
 //! top at z = 0.76. Drawer, door and buttons slide on joints of their own; the lights follow
 //! their buttons ([`light`]).
+//!
+//! Differs from the original: a control step is 5 steps of 4 ms, not 10 of 2 (a light's own are 2);
+//! furniture never meets furniture; the table's top goes on downwards under the caps, so that a hard
+//! push does not drive one through it.
 //! Source: DMCONTROL_ROBODESK.md 5.3 and 5.4.
 
 use domain::random::Rng;

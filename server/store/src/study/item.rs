@@ -73,6 +73,8 @@ pub struct ItemLine {
 impl Store {
     /// Keeps a study's pairs, all or none; those that are kept already stay as they are.
     ///
+    /// Their order becomes their numbers, which every export tells: it must not tell methods.
+    ///
     /// * `tasks` – names, in the order of their numbers
     ///
     /// # Errors
@@ -133,7 +135,7 @@ impl Store {
         .await
     }
 
-    /// How far each pair of a study is, in the order of its file.
+    /// How far each pair of a study is, in the order in which they were kept.
     ///
     /// # Errors
     /// When the database cannot be read.

@@ -10,7 +10,7 @@ use sqlx::sqlite::SqliteRow;
 use super::item::{COPY_SEGMENTS, collection};
 use super::{StudyId, note, state_of};
 use crate::error::{LinkTrouble, StoreError};
-use crate::labeler::{self, Labeler, LabelerId};
+use crate::labeler::{self, Labeler, LabelerId, name_of_seat};
 use crate::query::{QueryId, ask, word};
 use crate::run;
 use crate::secret::Secret;
@@ -180,11 +180,14 @@ impl Store {
                 let entrance = entrance(row.as_ref(), now_ms)?;
                 let row = row.ok_or(StoreError::Link(LinkTrouble::Unknown))?;
                 let seat: i64 = row.try_get("id")?;
-                let name = format!("labeler {} of study {}", entrance.number, entrance.study);
-                let id = labeler::find_or_add(t, &name).await?;
-                if !entrance.is_return {
+                let name = name_of_seat(entrance.number, entrance.study);
+                let seated = row.try_get::<Option<i64>, _>("labeler_id")?;
+                let id = if let Some(seated) = seated {
+                    LabelerId(seated)
+                } else {
                     lay_out(t, entrance, seat, &plan).await?;
-                }
+                    labeler::find_or_add_kept(t, &name).await?
+                };
                 sqlx::query(
                     "update study_seat set invite_used = 1, labeler_id = ?, return_hash = ?,
                         entered_at_ms = coalesce(entered_at_ms, ?) where id = ?",

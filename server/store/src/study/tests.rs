@@ -382,3 +382,45 @@ async fn a_preparation_that_failed_can_be_taken_up_again() {
     let row = store.study(id).await.unwrap();
     assert_eq!((row.state.as_str(), row.n_bad), ("preparing", 0));
 }
+
+#[tokio::test]
+async fn nobody_comes_in_as_a_labeler_of_a_study_or_as_a_program_by_typing_a_name() {
+    let (_folder, store, study) = prepared(Question::Preference).await;
+    seal(&store, study).await;
+    store.open_study(study).await.unwrap();
+    let name = crate::labeler::name_of_seat(1, study);
+    let typed_before = Secret::random().unwrap();
+    let (squatted, browser) = (name.clone(), typed_before.clone());
+    store
+        .write(move |t| {
+            Box::pin(async move {
+                // as versions did that kept no names
+                let id = crate::labeler::find_or_add_kept(t, &squatted).await?;
+                crate::labeler::admit(t, id, &browser).await
+            })
+        })
+        .await
+        .unwrap();
+    assert!(store.bearer(&typed_before).await.unwrap().is_some());
+    let labeler = seated(&store, study).await;
+    assert!(store.seat_of(labeler).await.unwrap().is_some());
+    let bearer = store.bearer(&typed_before).await.unwrap();
+    assert_eq!(bearer, None, "whoever had typed it is out");
+
+    let ordinary = store
+        .add_run(super::item::collection("push", 1))
+        .await
+        .unwrap();
+    store.add_teacher_token(ordinary).await.unwrap();
+    let program = crate::labeler::name_of_program(ordinary);
+    for name in [
+        name.as_str(),
+        program.as_str(),
+        "(server)",
+        "labeler 99 of study 99",
+    ] {
+        let refused = store.sign_in(name).await.unwrap_err();
+        assert!(matches!(&refused, StoreError::NameKept(n) if n == name));
+        assert!(refused.to_string().contains("another name"), "{refused}");
+    }
+}

@@ -26,7 +26,7 @@ use lab::run::Run;
 use serde_json::json;
 
 use super::{check, in_words};
-use crate::provenance::{REVISION, processors};
+use crate::provenance::{self, processors};
 
 /// How many threads a process computes on; whoever sets it knows better.
 const N_THREADS: &str = "RAYON_NUM_THREADS";
@@ -201,7 +201,8 @@ impl<'a> Pool<'a> {
     ) -> anyhow::Result<()> {
         progress.say(&format!("failed {}: {reason}", run.key.name()));
         progress.gives_up(run);
-        self.folder.add_failure(&run.key, &reason, REVISION)?;
+        let here = provenance::here(&run.config.device);
+        self.folder.add_failure(run, &reason, here)?;
         tally.failed.push((run.key.name(), reason));
         Ok(())
     }

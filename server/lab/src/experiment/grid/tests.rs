@@ -135,7 +135,7 @@ fn an_unknown_name_is_told_with_its_line_and_the_nearest_right_one() {
 fn a_value_out_of_range_is_told_with_its_line() {
     let told = told(&SMALL_TASK.replace("evaluation.episodes=50", "evaluation.episodes=0"));
     assert!(
-        told.contains("line 4") && told.contains("at least 1"),
+        told.contains("line 4") && told.contains("from 1 to 10000"),
         "{told}"
     );
 }

@@ -213,6 +213,11 @@ fn only_terms(config: &RunConfig) -> RunConfig {
     };
     terms.training.updates_per_step = config.training.updates_per_step;
     terms.queries.segment_len = config.queries.segment_len;
-    terms.queries.candidates_per_query = config.queries.candidates_per_query;
+    let queries = &config.queries;
+    terms.queries.candidates_per_query = queries.candidates_per_query;
+    terms.queries.newest_episodes = queries.newest_episodes;
+    terms.queries.bpref_starts = queries.bpref_starts;
+    terms.queries.bpref_pairs = queries.bpref_pairs;
+    terms.queries.bpref_skips = queries.bpref_skips;
     terms
 }

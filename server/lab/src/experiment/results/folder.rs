@@ -13,11 +13,11 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
-use super::settings::{first_difference, without_seed};
+use super::settings::{first_difference, table, without_seed};
 use super::{Content, Results, Row, fingerprint};
 use crate::config::{ConfigError, RunConfig};
 use crate::experiment::grid::{GridRun, RunKey};
-use crate::history::RunHistory;
+use crate::history::{Provenance, RunHistory};
 
 /// Why a grid's folder cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -172,15 +172,17 @@ impl GridFolder {
     /// When the disk refuses.
     pub fn add_failure(
         &self,
-        key: &RunKey,
+        run: &GridRun,
         reason: &str,
-        revision: &str,
+        provenance: Provenance,
     ) -> Result<(), StoreError> {
         self.add(&[Row {
-            key: key.clone(),
+            key: run.key.clone(),
             content: Content::Failed {
                 reason: reason.to_owned(),
-                revision: revision.to_owned(),
+                revision: provenance.revision,
+                machine: provenance.machine,
+                config: table(&run.config),
             },
         }])
     }

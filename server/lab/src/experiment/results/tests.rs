@@ -104,7 +104,21 @@ fn rows_come_back_and_what_a_kill_left_is_cut() {
 #[test]
 fn a_failure_counts_until_the_run_is_finished_after_all() {
     let (_place, folder) = Place::new("failed");
-    folder.add_failure(&key(1), "out of memory", "abc").unwrap();
+    let run = GridRun {
+        key: key(1),
+        config: RunConfig::default(),
+    };
+    let reason = "out of memory";
+    folder.add_failure(&run, reason, provenance("abc")).unwrap();
+    let row = std::fs::read_to_string(folder.results_path()).unwrap();
+    let row: Row = serde_json::from_str(&row).unwrap();
+    let expected = Content::Failed {
+        reason: reason.into(),
+        revision: "abc".into(),
+        machine: "two cores".into(),
+        config: settings::table(&run.config),
+    };
+    assert_eq!(row.content, expected);
     assert_eq!(
         folder.results().unwrap().failed,
         [(key(1), "out of memory".to_owned())]
