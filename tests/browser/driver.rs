@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
+use fantoccini::actions::{InputSource as _, KeyAction, KeyActions};
 use fantoccini::wd::Capabilities;
 use fantoccini::{Client, ClientBuilder, Locator};
 use hyper_util::client::legacy::connect::HttpConnector;
@@ -83,6 +84,29 @@ impl Browser {
             self.until("document.readyState === 'complete'").await;
         }
         panic!("no key could be pressed: {refused:?}");
+    }
+
+    /// Presses and releases one key as a keyboard does, wherever the focus is: on a slider, which
+    /// takes no text, too.
+    pub(crate) async fn strike(&self, key: char) {
+        let strike = KeyActions::new("keyboard".into())
+            .then(KeyAction::Down { value: key })
+            .then(KeyAction::Up { value: key });
+        let struck = self.client.perform_actions(strike).await;
+        struck.expect("the key is pressed");
+    }
+
+    /// Clicks into the middle of the first element that a CSS selector finds.
+    pub(crate) async fn click(&self, selector: &str) {
+        let element = self.client.find(Locator::Css(selector)).await;
+        let element = element.unwrap_or_else(|e| panic!("{selector}: {e}"));
+        element.click().await.expect("it can be clicked");
+    }
+
+    /// Loses what servers have set to know this browser again.
+    pub(crate) async fn lose_cookies(&self) {
+        let lost = self.client.delete_all_cookies().await;
+        lost.expect("cookies can be deleted");
     }
 
     /// Value of a JavaScript expression.

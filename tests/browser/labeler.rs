@@ -74,11 +74,18 @@ impl Desk {
     }
 }
 
+/// Says a name where it is asked for, in a browser that has read the guidance, and waits for a pair.
+pub(crate) async fn say_name(browser: &Browser, name: &str) {
+    browser
+        .until("document.querySelector('input[name=name]') !== null")
+        .await;
+    browser.press(&format!("{name}\u{E007}")).await;
+    browser.until("document.body.dataset.shown").await;
+}
+
 /// Presses `key` when the pair that is on can be judged, and waits for what comes next.
 pub(crate) async fn answer(browser: &Browser, key: &str) {
-    let is_on = "document.body.dataset.stage === 'working' && document.body.dataset.shown";
-    let is_old = "performance.now() - Number(document.body.dataset.shownAt) > 200";
-    browser.until(&format!("{is_on} && {is_old}")).await;
+    until_judged(browser).await;
     let before = browser.value("document.body.dataset.shown").await;
     browser.press(key).await;
     browser
@@ -86,6 +93,13 @@ pub(crate) async fn answer(browser: &Browser, key: &str) {
             "document.body.dataset.stage === 'waiting' || (document.body.dataset.shown && document.body.dataset.shown !== {before})"
         ))
         .await;
+}
+
+/// Waits until a pair has been on for so long that the page takes an answer to it.
+pub(crate) async fn until_judged(browser: &Browser) {
+    let is_on = "document.body.dataset.stage === 'working' && document.body.dataset.shown";
+    let is_old = "performance.now() - Number(document.body.dataset.shownAt) > 200";
+    browser.until(&format!("{is_on} && {is_old}")).await;
 }
 
 /// Presses a key that answers the question which is on.

@@ -1,13 +1,21 @@
-//! Answering: by keys only, changing one's mind, and through a lost connection.
+//! Answering: by keys only, changing one's mind, and through a lost connection or a lost cookie.
 
 use std::time::Duration;
 
 use serde_json::json;
 
 use super::driver::{Browser, Scheme};
-use super::labeler::{Desk, answer, answer_any};
+use super::labeler::{Desk, answer, answer_any, say_name, until_judged};
 
 const SCREEN: (u32, u32) = (1280, 900);
+const ESCAPE: &str = "\u{E00C}";
+const TAB: char = '\u{E004}';
+const LEFT: char = '\u{E012}';
+const RIGHT: char = '\u{E014}';
+
+/// Everything is answered, and the server knows.
+const IS_DONE: &str = "document.body.dataset.stage === 'waiting' && document.querySelector('#waiting').dataset.kind === 'done'";
+const IS_KEPT_HERE: &str = "document.querySelector('#saved').textContent.includes('kept here')";
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_person_answers_a_whole_run_by_keys_only() {
@@ -108,6 +116,138 @@ async fn an_answer_can_be_gone_back_to_and_changed() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn the_last_answer_can_be_gone_back_to_and_changed() {
+    let Some(browser) = Browser::open(Scheme::Light, SCREEN).await else {
+        return;
+    };
+    let desk = Desk::set_up(1).await;
+    desk.sit_down(&browser).await;
+    for index in 0..2 {
+        answer_any(&browser, index).await;
+    }
+    browser.until(IS_DONE).await;
+
+    browser.click("#undo-waiting").await;
+    browser
+        .until(
+            "document.body.dataset.stage === 'working' && !document.querySelector('#again').hidden",
+        )
+        .await;
+    assert_eq!(browser.text("#before").await, "different stages");
+    browser.press(ESCAPE).await;
+    browser.until(IS_DONE).await;
+    browser.press("z").await;
+    answer(&browser, "s").await;
+
+    browser.until(IS_DONE).await;
+    wait_until_stored(&browser).await;
+    let answers = desk.stored();
+    let n_changed = answers
+        .iter()
+        .filter(|row| !row["supersedes"].is_null())
+        .count();
+    assert_eq!((answers.len(), n_changed), (3, 1), "{answers:?}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn arrows_step_frames_on_the_slider_that_keys_led_to_and_answer_on_one_that_was_dragged() {
+    let Some(browser) = Browser::open(Scheme::Light, SCREEN).await else {
+        return;
+    };
+    let desk = Desk::set_up(2).await;
+    desk.sit_down(&browser).await;
+    let is_on_slider = "document.activeElement.dataset.do === 'scrub'";
+    for _ in 0..20 {
+        if browser.value(is_on_slider).await == json!(true) {
+            break;
+        }
+        browser.strike(TAB).await;
+    }
+    until_judged(&browser).await;
+    let shown = browser.value("document.body.dataset.shown").await;
+
+    browser.strike(RIGHT).await;
+    let seek = "document.getElementById('pair').seek(10);";
+    browser.run(seek, vec![]).await; // it holds still since the first arrow
+    for key in [RIGHT, RIGHT, LEFT] {
+        browser.strike(key).await;
+    }
+    let seen = "[document.getElementById('pair').frame, document.body.dataset.shown]";
+    assert_eq!(browser.value(seen).await, json!([11, shown]));
+    assert_eq!(n_unsent(&browser).await + desk.stored().len(), 0);
+
+    browser.click("[data-do=scrub]").await;
+    browser.strike(RIGHT).await;
+    browser
+        .until(&format!("document.body.dataset.shown !== {shown}"))
+        .await;
+    wait_until_stored(&browser).await;
+    assert_eq!(desk.stored().len(), 1);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_stages_of_a_skipped_pair_are_not_asked_about_though_the_server_offers_them_still() {
+    let Some(browser) = Browser::open(Scheme::Light, SCREEN).await else {
+        return;
+    };
+    let desk = Desk::set_up(2).await;
+    desk.sit_down(&browser).await;
+    let delay = "const send = fetch; window.fetch = async (url, how) => {
+        if (how?.method === 'PUT') await new Promise((resolve) => setTimeout(resolve, 900));
+        return send(url, how);
+    };";
+    browser.run(delay, vec![]).await;
+
+    until_judged(&browser).await;
+    let before = browser.value("document.body.dataset.shown").await;
+    browser.press("u").await;
+    browser
+        .until("document.querySelector('#reasons[open]') !== null")
+        .await;
+    browser.press("3").await; // a clip is broken
+    browser
+        .until(&format!(
+            "document.body.dataset.shown && document.body.dataset.shown !== {before}"
+        ))
+        .await;
+    answer(&browser, "1").await;
+
+    browser.until(IS_DONE).await;
+    wait_until_stored(&browser).await;
+    let answers = desk.stored();
+    let told: Vec<_> = answers.iter().map(|row| &row["question"]).collect();
+    assert_eq!(told, ["preference", "preference"], "{answers:?}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn time_under_the_guidance_does_not_count() {
+    let Some(browser) = Browser::open(Scheme::Light, SCREEN).await else {
+        return;
+    };
+    let desk = Desk::set_up(2).await;
+    desk.sit_down(&browser).await;
+    until_judged(&browser).await;
+    let shown_at = browser.value("Number(document.body.dataset.shownAt)").await;
+    browser.press("?").await;
+    let is_open = "document.querySelector('#guidance[open]') !== null";
+    browser.until(is_open).await;
+    let note = "window.coveredAt = performance.now();";
+    browser.run(note, vec![]).await;
+    browser.until("performance.now() - coveredAt > 3000").await;
+    browser.press("?").await;
+    browser.until(&format!("!({is_open})")).await;
+    answer(&browser, "1").await;
+    let answered_by = browser.value("performance.now()").await;
+
+    wait_until_stored(&browser).await;
+    let answers = desk.stored();
+    let ms = |value: &serde_json::Value| value.as_f64().expect("milliseconds");
+    let at_most = ms(&answered_by) - ms(&shown_at) - 3000.0;
+    let visible = ms(&answers[0]["visible_ms"]);
+    assert!((200.0..=at_most).contains(&visible), "{visible}, {at_most}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn a_pair_is_shown_once_however_late_the_server_replies() {
     let Some(browser) = Browser::open(Scheme::Light, SCREEN).await else {
         return;
@@ -170,6 +310,59 @@ async fn answers_given_without_a_connection_are_stored_once_it_is_back() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn answers_of_a_browser_that_lost_its_cookie_are_stored_once_the_name_is_said_again() {
+    let Some(browser) = Browser::open(Scheme::Light, SCREEN).await else {
+        return;
+    };
+    let desk = Desk::set_up(12).await;
+    desk.sit_down(&browser).await;
+    browser.lose_cookies().await;
+    for index in 0..2 {
+        answer_any(&browser, index).await;
+    }
+    browser
+        .until(&format!(
+            "{IS_KEPT_HERE} && !document.querySelector('#stranger').hidden"
+        ))
+        .await;
+    assert!(desk.stored().is_empty());
+
+    browser.click("#stranger a").await;
+    say_name(&browser, "Ada").await;
+    wait_until_stored(&browser).await;
+    assert_eq!(desk.stored().len(), 2);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_answer_that_cannot_be_delivered_is_kept_and_holds_up_no_other() {
+    let Some(browser) = Browser::open(Scheme::Light, SCREEN).await else {
+        return;
+    };
+    let desk = Desk::set_up(12).await;
+    desk.sit_down(&browser).await;
+    browser.lose_cookies().await;
+    answer_any(&browser, 0).await;
+    browser.until(IS_KEPT_HERE).await;
+
+    browser.goto(&desk.label_page()).await;
+    say_name(&browser, "Bob").await;
+    browser
+        .until("!document.querySelector('#undelivered').hidden")
+        .await;
+    answer_any(&browser, 0).await;
+    browser
+        .until("document.querySelector('#saved').dataset.state === 'saved'")
+        .await;
+    assert_eq!((n_unsent(&browser).await, desk.stored().len()), (1, 1));
+
+    browser.lose_cookies().await;
+    browser.goto(&desk.label_page()).await;
+    say_name(&browser, "Ada").await;
+    wait_until_stored(&browser).await;
+    assert_eq!(desk.stored().len(), 2);
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn a_double_click_and_a_second_tab_make_no_second_label() {
     let Some(browser) = Browser::open(Scheme::Light, SCREEN).await else {
         return;
@@ -226,6 +419,17 @@ async fn a_double_click_and_a_second_tab_make_no_second_label() {
 
 /// Until nothing that was answered in this browser is unsent.
 async fn wait_until_stored(browser: &Browser) {
+    for _ in 0..1_000 {
+        if n_unsent(browser).await == 0 {
+            return;
+        }
+        tokio::time::sleep(Duration::from_millis(50)).await;
+    }
+    panic!("answers stay unsent");
+}
+
+/// Answers that this browser keeps for the server.
+async fn n_unsent(browser: &Browser) -> usize {
     let n_unsent = "return new Promise((resolve, reject) => {
         const opening = indexedDB.open('stair', 1);
         opening.onerror = () => reject(opening.error);
@@ -234,11 +438,9 @@ async fn wait_until_stored(browser: &Browser) {
             counting.onsuccess = () => { opening.result.close(); resolve(counting.result); };
         };
     })";
-    for _ in 0..1_000 {
-        if browser.run(n_unsent, vec![]).await == json!(0) {
-            return;
-        }
-        tokio::time::sleep(Duration::from_millis(50)).await;
-    }
-    panic!("answers stay unsent");
+    let n_unsent = browser.run(n_unsent, vec![]).await;
+    n_unsent
+        .as_u64()
+        .and_then(|n| n.try_into().ok())
+        .expect("a number")
 }

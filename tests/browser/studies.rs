@@ -3,10 +3,15 @@
 use serde_json::json;
 
 use super::driver::{Browser, Scheme};
-use super::labeler::answer;
+use super::labeler::{answer, until_judged};
 use crate::api::studies::Open;
 
 const ENTER: &str = "\u{E007}";
+const ESCAPE: &str = "\u{E00C}";
+
+/// The last pair is answered, the answer is with the server, and Enter goes on.
+const CAN_GO_ON: &str =
+    "document.activeElement?.id === 'to-seat' && document.activeElement.checkVisibility()";
 
 /// * `n_practice`, `n` – pairs that are practice, and all
 async fn answers_everything(name: &str, key: &str, (n_practice, n): (usize, usize), figure: &str) {
@@ -47,24 +52,32 @@ async fn answers_everything(name: &str, key: &str, (n_practice, n): (usize, usiz
     }
     loop {
         browser
-            .until("document.querySelector('#seat') !== null || (document.body.dataset.stage === 'working' && document.body.dataset.shown)")
+            .until(&format!("({CAN_GO_ON}) || (document.body.dataset.stage === 'working' && document.body.dataset.shown)"))
             .await;
-        if browser
-            .value("document.querySelector('#seat') !== null")
-            .await
-            == json!(true)
-        {
+        if browser.value(CAN_GO_ON).await == json!(true) {
             break;
         }
         let before = browser.value("document.body.dataset.shown").await;
-        browser
-            .until("!document.body.dataset.shownAt || performance.now() - Number(document.body.dataset.shownAt) > 200")
-            .await;
+        until_judged(&browser).await;
         browser.press(key).await;
         browser
-            .until(&format!("document.querySelector('#seat') !== null || document.body.dataset.shown !== {before}"))
+            .until(&format!(
+                "({CAN_GO_ON}) || document.body.dataset.shown !== {before}"
+            ))
             .await;
     }
+    browser.press("z").await; // the last answer can be gone back to
+    browser
+        .until(
+            "document.body.dataset.stage === 'working' && !document.querySelector('#again').hidden",
+        )
+        .await;
+    browser.press(ESCAPE).await; // and left as it is
+    browser.until(CAN_GO_ON).await;
+    browser.press(ENTER).await;
+    browser
+        .until("document.querySelector('#seat') !== null")
+        .await;
     assert!(browser.text("#seat h1").await.contains("Thank you"));
     assert_eq!(study.labels().len(), n);
     let timed = study.labels();

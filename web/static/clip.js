@@ -37,11 +37,12 @@ export class Clip {
 /**
  * @param {string} url of an MP4 file
  * @param {{fps?: number, n_frames?: number}} [known] what the server said about it
- * @returns {Promise<Clip>} rejects with BrokenClip, or TypeError when the network failed
+ * @returns {Promise<Clip>} rejects with BrokenClip, or TypeError when the network failed or the
+ *   server does not know who asks
  */
 export async function loadClip(url, known = {}) {
   const response = await fetch(url);
-  if (response.status >= 500) throw new TypeError(`the server answered ${response.status}`);
+  if (response.status >= 500 || response.status === 401) throw new TypeError(`the server answered ${response.status}`);
   if (!response.ok) throw new BrokenClip(`the clip is not there (${response.status})`);
   const bytes = await response.arrayBuffer();
   try {

@@ -1,10 +1,10 @@
 // The labeler's page: one key stores the answer and shows the next pair.
-import { Problem } from './api.js';
 import { Outbox } from './outbox.js';
 import './pair.js';
 import { preparePair, ReadyPairs, releasePair } from './ready.js';
+import { Settled } from './settled.js';
 import { WaitingCard } from './waiting.js';
-import { announce, notice, tellSaved, tellUnsaved, tellWaitingAnswers } from './words.js';
+import { announce, notice, tellKnown, tellSaved, tellUndelivered, tellUnsaved, tellWaitingAnswers } from './words.js';
 
 const KEYS = {
   preference: { 1: 'left', ArrowLeft: 'left', 2: 'right', ArrowRight: 'right', 3: 'equal', ArrowDown: 'equal' },
@@ -26,7 +26,7 @@ const reasons = $('reasons');
 /** A study: fixed pairs, practice with a word on each answer, and a task after this one. */
 const isStudy = 'study' in page.dataset;
 const feedback = $('feedback');
-const waiting = new WaitingCard(run, !isStudy);
+const waiting = new WaitingCard(run, isStudy);
 
 /** What is on: `{lease, left, right}`, and whether it is an answered one that was gone back to. */
 let current = null;
@@ -36,22 +36,22 @@ let interrupted = null;
 let history = [];
 /** An answered pair is being fetched again; what is on stays on and takes no answer. */
 let isTurningBack = false;
-/** The clips played when the guidance covered them. */
-let playsOn = false;
+/** When the pair that is on was first there with nothing over it. */
 let shownAt = 0;
 let pressedAt = 0;
-let answered = new Set();
+let settled;
 let usesShortcuts = localStorage.getItem('stair-shortcuts') !== 'off';
 let outbox;
 let ready;
 
 async function start() {
   outbox = await Outbox.open(run);
-  answered = await outbox.answeredLeases();
   history = await outbox.history();
-  const shown = () => [current, interrupted].filter(Boolean).map((pair) => pair.lease.lease_id);
-  ready = new ReadyPairs(run, (leaseId) => answered.has(leaseId), shown);
+  settled = new Settled(await outbox.answeredLeases(), history);
+  const shown = () => [current, interrupted].filter(Boolean).map((pair) => pair.lease);
+  ready = new ReadyPairs(run, (lease) => settled.has(lease), shown);
   listen();
+  outbox.start();
   tellShortcuts();
   greet();
   await ready.refill();
@@ -70,6 +70,7 @@ function proceed() {
     pressedAt = 0;
     if (page.dataset.stage === 'working') tellWaiting({ kind: 'open' });
     setStage('waiting');
+    tellUndo();
     refill();
   }
 }
@@ -83,12 +84,20 @@ function show(pair, before) {
   $('practice').hidden = !pair.lease.practice;
   $('again').hidden = !isChanging;
   if (isChanging) $('before').textContent = WORDS[before] ?? before;
-  $('undo').disabled = undoable() === null;
-  shownAt = Infinity;
+  tellUndo();
   page.dataset.shown = '';
+  setShownAt(Infinity);
   setStage('working');
   player.show(pair.left, pair.right);
-  if (guidance.open || feedback?.open) holdClips();
+}
+
+/** Takes off a pair that is not to be answered here any more. */
+function takeOff() {
+  const leaving = current;
+  current = null;
+  player.clear();
+  releasePair(leaving);
+  proceed();
 }
 
 function setStage(stage) {
@@ -100,11 +109,14 @@ function setStage(stage) {
 }
 
 function firstFrameIsOn() {
-  shownAt = performance.now();
-  if (pressedAt) performance.measure('key-to-first-frame', { start: pressedAt, end: shownAt });
+  if (pressedAt) performance.measure('key-to-first-frame', { start: pressedAt });
   pressedAt = 0;
   page.dataset.shown = current?.lease.lease_id ?? '';
-  page.dataset.shownAt = String(shownAt);
+}
+
+function setShownAt(time) {
+  shownAt = time;
+  page.dataset.shownAt = String(time);
 }
 
 // --- answering ---------------------------------------------------------------------------------
@@ -124,7 +136,7 @@ function answer(word, input, reason = null, pressed = performance.now()) {
   isChanging = false;
   pressedAt = pressed;
   tellUnsaved();
-  const kept = wasChange ? outbox.change(pair.lease, body) : keepFirst(pair, body);
+  const kept = wasChange ? keepChange(pair, body) : keepFirst(pair, body);
   if (pair.lease.practice) tellPractice(pair.lease.practice, word);
   proceed();
   releasePair(pair);
@@ -136,19 +148,33 @@ function tellPractice({ expects, because }, word) {
   const isRight = word === expects;
   $('feedback-title').textContent = isRight ? 'Yes' : `Most people say: ${WORDS[expects]}`;
   $('feedback-text').textContent = because;
-  feedback.showModal();
+  cover(feedback);
 }
 
-async function keepFirst(pair, body) {
-  const { lease_id } = pair.lease;
-  answered.add(lease_id);
-  ready.drop(lease_id);
-  history = history.filter((row) => row.lease_id !== lease_id);
-  history.push({ lease_id, lease: pair.lease, answer: body.answer });
-  $('undo').disabled = undoable() === null;
-  const isNew = await outbox.answer(pair.lease, body);
-  if (isNew) tabs.postMessage(pair.lease.lease_id);
+async function keepFirst({ lease }, body) {
+  settle(lease, body.answer);
+  history = history.filter((row) => row.lease_id !== lease.lease_id);
+  history.push({ lease_id: lease.lease_id, lease, answer: body.answer });
+  const isNew = await outbox.answer(lease, body);
+  if (isNew) tabs.postMessage({ lease, answer: body.answer });
   else notice('This pair was answered in another tab already; that answer stands.');
+}
+
+async function keepChange({ lease }, body) {
+  settle(lease, body.answer);
+  const row = history.find((kept) => kept.lease_id === lease.lease_id);
+  if (row) row.answer = body.answer;
+  await outbox.change(lease, body);
+  tabs.postMessage({ lease, answer: body.answer });
+}
+
+/** Notes an answer, and lets go of what waits here and is settled by it. */
+function settle(lease, word) {
+  settled.note(lease, word);
+  ready.dropTaken();
+  if (!interrupted || !settled.has(interrupted.lease)) return;
+  releasePair(interrupted);
+  interrupted = null;
 }
 
 function undoable() {
@@ -156,7 +182,14 @@ function undoable() {
   return at > 0 ? history[at - 1] : null;
 }
 
-/** Goes back to the answered pair before the one that is on. */
+/** The way back is on the bench, and on the card while there is no pair. */
+function tellUndo() {
+  const isPossible = undoable() !== null;
+  $('undo').disabled = !isPossible;
+  $('undo-waiting').hidden = !isPossible;
+}
+
+/** Goes back to the answered pair before the one that is on, or the last one. */
 async function undo() {
   const row = undoable();
   if (!row || isTurningBack) return;
@@ -167,10 +200,12 @@ async function undo() {
     else interrupted = current ?? interrupted;
     await showAgain(pair, row);
   } catch (reason) {
+    history = history.filter((kept) => kept !== row); // the next press goes further back
     notice(`That pair can no longer be shown: ${reason.message}`, true);
   } finally {
     isTurningBack = false;
     if (!current) proceed();
+    tellUndo();
   }
 }
 
@@ -191,7 +226,8 @@ function leaveUnchanged() {
 }
 
 async function skipBroken({ lease, reason }) {
-  answered.add(lease.lease_id);
+  settle(lease, 'skip');
+  if (current && !isChanging && settled.has(current.lease)) takeOff();
   await outbox.answer(lease, {
     answer: 'skip',
     reason: `the browser could not show a clip: ${reason.message}`,
@@ -220,7 +256,6 @@ function proceedIfReady() {
 }
 
 function tellProgress({ state, progress }) {
-  if (isStudy && state.kind === 'done' && !current) return leaveWhenSent();
   const { answered: n, budget, session, session_answered, session_size } = progress;
   $('answers').textContent = `${n} of ${budget} answers`;
   $('bar').max = budget;
@@ -230,44 +265,36 @@ function tellProgress({ state, progress }) {
   if (page.dataset.stage === 'waiting' || !current) tellWaiting(state);
 }
 
-function tellWaiting(state) {
-  waiting.tell(state, ready.isPreparing);
+let nTold = 0;
+
+/** A study's last pair is done, and the way on open, once every answer is with the server. */
+async function tellWaiting(state) {
+  const turn = (nTold += 1);
+  const isUnsent = isStudy && state.kind === 'done' && !(await outbox.isEmpty());
+  if (turn === nTold) waiting.tell(isUnsent ? { kind: 'open' } : state, ready.isPreparing);
 }
 
-/** The next task of a study, once every answer is with the server. */
-async function leaveWhenSent() {
-  if (await outbox.isEmpty()) location.assign('/seat');
+// --- what lies over the pair -------------------------------------------------------------------
+
+function cover(dialog) {
+  player.cover();
+  dialog.showModal();
 }
 
-// --- guidance ----------------------------------------------------------------------------------
+function uncovered() {
+  if (!document.querySelector('dialog[open]')) player.uncover();
+}
 
 /** Guidance comes before the first pair, and again when its words have changed. */
 function greet() {
   if (localStorage.getItem('stair-guidance') === page.dataset.guidance) return;
-  guidance.showModal();
+  cover(guidance);
 }
 
 /** Once more, in the middle of it. */
 function openGuidance() {
   $('close-guidance').textContent = 'Go on';
-  holdClips();
-  guidance.showModal();
-}
-
-function holdClips() {
-  if (!player.playing) return;
-  player.toggle();
-  playsOn = true;
-}
-
-function guidanceClosed() {
-  localStorage.setItem('stair-guidance', page.dataset.guidance);
-  resumeClips();
-}
-
-function resumeClips() {
-  if (playsOn && current && !player.playing) player.toggle();
-  playsOn = false;
+  cover(guidance);
 }
 
 function tellShortcuts() {
@@ -282,9 +309,11 @@ const tabs = new BroadcastChannel('stair-answered');
 function listen() {
   document.addEventListener('keydown', keyPressed);
   player.addEventListener('firstframe', firstFrameIsOn);
+  player.addEventListener('seen', () => setShownAt(performance.now()));
   page.addEventListener('click', clicked);
   ready.addEventListener('state', ({ detail }) => {
-    outbox.wake();
+    outbox.wake(detail.leases);
+    tellKnown(true);
     tellProgress(detail);
   });
   ready.addEventListener('ready', () => { if (!current) proceedIfReady(); });
@@ -293,16 +322,29 @@ function listen() {
   ready.addEventListener('refused', ({ detail }) => refused(detail));
   outbox.addEventListener('saved', ({ detail }) => {
     tellSaved(detail.stored_at);
+    tellKnown(true);
     refill(); // only now does the server count this answer
   });
-  outbox.addEventListener('waiting', ({ detail }) => tellWaitingAnswers(detail));
-  outbox.addEventListener('refused', ({ detail }) => {
-    notice(detail.message, true);
+  outbox.addEventListener('waiting', ({ detail }) => {
+    tellWaitingAnswers(detail);
+    if (detail.why === 'stranger') tellKnown(false);
+  });
+  outbox.addEventListener('undelivered', ({ detail }) => tellUndelivered(detail));
+  outbox.addEventListener('refused', ({ detail: { message, lease, isForgotten } }) => {
+    notice(`The server did not take an answer: ${message}`, true);
+    if (isForgotten) {
+      tabs.postMessage({ lease, answer: null });
+      forgetAnswer(lease);
+    }
     refill();
   });
-  tabs.addEventListener('message', ({ data }) => answeredElsewhere(data));
-  guidance.addEventListener('close', guidanceClosed);
-  feedback?.addEventListener('close', resumeClips);
+  tabs.addEventListener('message', ({ data }) => {
+    if (data.answer !== null) return answeredElsewhere(data);
+    forgetAnswer(data.lease);
+    refill();
+  });
+  for (const dialog of document.querySelectorAll('dialog')) dialog.addEventListener('close', uncovered);
+  guidance.addEventListener('close', () => localStorage.setItem('stair-guidance', page.dataset.guidance));
   $('shortcuts').addEventListener('change', () => {
     usesShortcuts = $('shortcuts').checked;
     localStorage.setItem('stair-shortcuts', usesShortcuts ? 'on' : 'off');
@@ -316,29 +358,33 @@ function offline() {
 }
 
 function refused(problem) {
-  const message = problem instanceof Problem ? problem.message : String(problem);
-  if (!current) tellWaiting({ kind: 'failed', message });
+  const isStranger = problem.status === 401;
+  if (isStranger) tellKnown(false);
+  if (!current) tellWaiting(isStranger ? { kind: 'stranger' } : { kind: 'failed', message: problem.message });
 }
 
-function answeredElsewhere(leaseId) {
-  answered.add(leaseId);
-  ready.drop(leaseId);
-  if (interrupted?.lease.lease_id === leaseId) {
-    releasePair(interrupted);
-    interrupted = null;
-  }
+function answeredElsewhere({ lease, answer: word }) {
+  settle(lease, word);
   if (!current) refill();
-  if (current?.lease.lease_id !== leaseId || isChanging) return;
-  const leaving = current;
-  current = null;
-  player.clear();
-  releasePair(leaving);
-  notice('You answered this pair in another tab; here is the next one.');
-  proceed();
+  else if (!isChanging && settled.has(current.lease)) {
+    notice('You answered this pair in another tab; here is the next one.');
+    takeOff();
+  }
+}
+
+/** No answer to this lease stands: if it is offered again, it is asked as if for the first time. */
+function forgetAnswer(lease) {
+  settled.forget(lease);
+  history = history.filter((row) => row.lease_id !== lease.lease_id);
+  if (isChanging && current.lease.lease_id === lease.lease_id) {
+    isChanging = false;
+    $('again').hidden = true;
+  }
+  tellUndo();
 }
 
 function keyPressed(event) {
-  if (!usesShortcuts || event.ctrlKey || event.metaKey || event.altKey || event.repeat && !PLAYER_KEYS[event.key]) return;
+  if (!usesShortcuts || event.defaultPrevented || event.ctrlKey || event.metaKey || event.altKey || event.repeat && !PLAYER_KEYS[event.key]) return;
   if (reasons.open) return reasonPressed(event);
   if (feedback?.open) return; // Enter and Escape are the dialog's own
   if (guidance.open) {
@@ -370,7 +416,7 @@ function reasonPressed(event) {
 }
 
 function askReason() {
-  reasons.showModal();
+  cover(reasons);
 }
 
 function skip(reason, input) {
@@ -386,7 +432,7 @@ function clicked(event) {
   const input = event.detail === 0 ? 'key' : 'pointer';
   if (button.dataset.answer && !isSecondClick) answer(button.dataset.answer, input, null, event.timeStamp);
   else if (button.dataset.reason !== undefined) skip(button.value, input);
-  else if (button.id === 'undo') undo();
+  else if (button.id === 'undo' || button.id === 'undo-waiting') undo();
   else if (button.id === 'unsure') askReason();
   else if (button.id === 'leave') leaveUnchanged();
   else if (button.id === 'help') openGuidance();

@@ -1,8 +1,8 @@
-// Keeps every answer in the browser until the server has said that it is stored.
+// Keeps every answer in the browser until the server has said that it keeps it.
 //
 // An answer is written to IndexedDB before it is sent, and taken out when it is acknowledged: a
-// lost connection, a closed lid or a restarted server lose nothing. Sending twice is harmless,
-// the server stores an answer to a lease once.
+// lost connection, a closed lid, a restarted server or a lost cookie lose nothing. Sending twice
+// is harmless, the server stores an answer to a lease once.
 import { Problem, request } from './api.js';
 
 /** Answered pairs that can be gone back to. */
@@ -15,22 +15,35 @@ const LAST_RETRY_MS = 5_000;
  *   `answer_id` is null until the server has acknowledged it
  */
 
-/** Fires `saved` ({stored_at}), `refused` ({message, status, lease_id}) and `waiting` ({count, isOffline}). */
+/**
+ * Fires `saved` ({stored_at, lease_id}) · `waiting` ({count, why}) while nothing gets through: `offline`,
+ * `busy`, or `stranger` when the server does not know who answers · `undelivered` ({count}) when it does
+ * not take some from here, which stay in this browser · `refused` ({message, lease, isForgotten}) when it
+ * does not take one at all; `isForgotten` when none stands for its lease, so that it can be asked again.
+ */
 export class Outbox extends EventTarget {
   #database;
   #run;
   #sending = false;
+  /** Something was answered, or heard of, while the last was being sent. */
+  #isToSendAgain = false;
   #retryMs = FIRST_RETRY_MS;
   #timer = 0;
+  /** Leases whose answers the server does not take from here; tried again when it offers them, or a page is opened. */
+  #undelivered = new Set();
 
   /** @param {string} run only this run's history is told; every run's unsent answers are sent */
   static async open(run) {
     const outbox = new Outbox();
     outbox.#run = run;
     outbox.#database = await openDatabase();
-    addEventListener('online', () => outbox.#sendSoon(0));
-    outbox.#sendSoon(0);
     return outbox;
+  }
+
+  /** Sends what is unsent from before; whoever listens does so by now. */
+  start() {
+    addEventListener('online', () => this.#sendSoon(0));
+    this.#sendSoon(0);
   }
 
   /** The run's answered pairs, oldest first. @returns {Promise<Answered[]>} */
@@ -66,9 +79,15 @@ export class Outbox extends EventTarget {
     this.#sendSoon(0);
   }
 
-  /** The server was heard of: what waits for a connection need wait no longer. */
-  wake() {
-    if (this.#retryMs === FIRST_RETRY_MS) return;
+  /**
+   * The server was heard of: what waits for it need wait no longer, and what it offers it takes from here.
+   *
+   * @param {object[]} offered leases
+   */
+  wake(offered) {
+    const isTakenNow = offered.filter((lease) => this.#undelivered.delete(lease.lease_id)).length > 0;
+    if (isTakenNow) this.#tell('undelivered', { count: this.#undelivered.size });
+    else if (this.#retryMs === FIRST_RETRY_MS) return;
     this.#retryMs = FIRST_RETRY_MS;
     this.#sendSoon(0);
   }
@@ -78,9 +97,15 @@ export class Outbox extends EventTarget {
     return new Set(await this.#read('answered', (store) => store.getAllKeys()));
   }
 
-  /** Whether the server has acknowledged every answer. @returns {Promise<boolean>} */
+  /** Whether nothing is left to send. @returns {Promise<boolean>} */
   async isEmpty() {
-    return (await this.#read('unsent', (store) => store.count())) === 0;
+    return (await this.#unsent()).length === 0;
+  }
+
+  /** Rows that may get through, in the order of answering. */
+  async #unsent() {
+    const rows = await this.#read('unsent', (store) => store.getAll());
+    return rows.filter((row) => !this.#undelivered.has(row.lease_id));
   }
 
   #sendSoon(afterMs) {
@@ -89,6 +114,7 @@ export class Outbox extends EventTarget {
   }
 
   async #sendAll() {
+    this.#isToSendAgain = this.#sending;
     if (this.#sending) return;
     this.#sending = true;
     try {
@@ -97,28 +123,30 @@ export class Outbox extends EventTarget {
       await (navigator.locks ? navigator.locks.request('stair-outbox', send) : send());
     } finally {
       this.#sending = false;
+      if (this.#isToSendAgain) this.#sendSoon(0);
     }
   }
 
   async #sendInOrder() {
     for (;;) {
-      const [item] = await this.#read('unsent', (store) => store.getAll(null, 1));
-      if (!item) break;
-      const count = await this.#read('unsent', (store) => store.count());
+      const unsent = await this.#unsent();
+      if (unsent.length === 0) break;
       try {
-        await this.#send(item);
-        this.#retryMs = FIRST_RETRY_MS;
+        await this.#send(unsent[0]);
       } catch (reason) {
-        if (!(reason instanceof Problem) || reason.isPassing) {
-          this.#tell('waiting', { count, isOffline: !(reason instanceof Problem) });
-          this.#sendSoon(this.#retryMs);
-          this.#retryMs = Math.min(LAST_RETRY_MS, this.#retryMs * 2);
-          return;
-        }
-        await this.#setAside(item, reason);
+        const why = whatHoldsItUp(reason);
+        if (why) return this.#tryAgain(why, unsent.length);
+        await this.#settle(unsent[0], reason);
       }
+      this.#retryMs = FIRST_RETRY_MS;
     }
-    this.#tell('waiting', { count: 0, isOffline: false });
+    this.#tell('waiting', { count: 0, why: null });
+  }
+
+  #tryAgain(why, count) {
+    this.#tell('waiting', { count, why });
+    this.#sendSoon(this.#retryMs);
+    this.#retryMs = Math.min(LAST_RETRY_MS, this.#retryMs * 2);
   }
 
   async #send(item) {
@@ -140,12 +168,38 @@ export class Outbox extends EventTarget {
     });
   }
 
-  /** The server will never take this one; it is told, and the next goes on. */
-  async #setAside(item, problem) {
+  /** The server has said no to this one, and will not say otherwise soon. */
+  #settle(item, problem) {
+    // Given under another name, or to a lease that is gone: the server has kept nothing.
+    const isLost = problem.status === 403 || problem.status === 404;
+    return isLost ? this.#keepBack(item) : this.#giveUp(item, problem);
+  }
+
+  /** It stays in this browser, and holds up no other. */
+  #keepBack(item) {
+    this.#undelivered.add(item.lease_id);
+    this.#tell('undelivered', { count: this.#undelivered.size });
+  }
+
+  /**
+   * Decided (409, 410), it is kept aside by the server; anything else is no answer to its question.
+   * A lease without an answer that stands does not count as answered: offered again, it is shown.
+   */
+  async #giveUp(item, problem) {
     const row = await this.#read('answered', (store) => store.get(item.lease_id));
-    const existing = problem.body?.answer_id ?? problem.body?.existing?.answer_id ?? row?.answer_id ?? null;
-    await this.#acknowledge(item, row, existing);
-    this.#tell('refused', { message: problem.message, status: problem.status, lease_id: item.lease_id });
+    const isDecided = problem.status === 409 || problem.status === 410;
+    const standing = isDecided ? (problem.body?.existing?.answer_id ?? row?.answer_id) : null;
+    if (standing) await this.#acknowledge(item, row, standing);
+    else await this.#forget(item);
+    const lease = row?.lease ?? { lease_id: item.lease_id };
+    this.#tell('refused', { message: problem.message, lease, isForgotten: !standing });
+  }
+
+  #forget(item) {
+    return this.#write(['answered', 'unsent'], (transaction) => {
+      transaction.objectStore('answered').delete(item.lease_id);
+      transaction.objectStore('unsent').delete(item.key);
+    });
   }
 
   #tell(type, detail) {
@@ -170,6 +224,13 @@ export class Outbox extends EventTarget {
       change(transaction);
     });
   }
+}
+
+/** Why an answer did not get through now but may later; null when the server has decided. */
+function whatHoldsItUp(reason) {
+  if (!(reason instanceof Problem)) return 'offline';
+  if (reason.status === 401) return 'stranger';
+  return reason.isPassing ? 'busy' : null;
 }
 
 function openDatabase() {

@@ -10,13 +10,23 @@ import { loadClip } from './clip.js';
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4];
 /** Real seconds that the last frame stays on before the loop starts again. */
 const HOLD_S = 0.5;
+/** Frames that an arrow goes on a slider, as on any other. */
+const ARROWS = { ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1 };
 
-/** Fires `firstframe` when both first frames are drawn, `change` when frame, speed or playing changed. */
+/**
+ * Fires `firstframe` when both first frames are drawn, `seen` when nothing lies over them for the
+ * first time, `change` when frame, speed or playing changed.
+ */
 export class StairPair extends HTMLElement {
   #clips = { left: null, right: null };
   #seconds = 0;
   #held = 0;
   #playing = false;
+  #isCovered = false;
+  /** The clips go on playing once nothing lies over them. */
+  #playsOn = false;
+  /** A pointer moved the slider that has the focus. */
+  #isDragged = false;
   #speed = 1;
   #last = null;
   #request = 0;
@@ -31,8 +41,11 @@ export class StairPair extends HTMLElement {
       else if (what && what !== 'scrub') this.do(what);
     });
     this.addEventListener('input', (event) => {
-      if (event.target.dataset.do === 'scrub') this.seek(Number(event.target.value));
+      if (isSlider(event.target)) this.seek(Number(event.target.value));
     });
+    this.addEventListener('pointerdown', ({ target }) => { if (isSlider(target)) this.#isDragged = true; });
+    this.addEventListener('focusout', ({ target }) => { if (isSlider(target)) this.#isDragged = false; });
+    this.addEventListener('keydown', (event) => this.#stepByArrow(event));
     document.addEventListener('visibilitychange', this.#visibilityChanged);
     if (this.hasAttribute('left')) this.#loadWhenSeen();
   }
@@ -63,9 +76,9 @@ export class StairPair extends HTMLElement {
     return clip ? clip.indexAt(this.#seconds) : 0;
   }
 
-  /** What was watched since `show`: for the honest timing that is stored with an answer. */
+  /** What was watched since the pair was `seen`: for the honest timing that is stored with an answer. */
   get watched() {
-    this.#countVisibleTime();
+    this.#countTime();
     const { visible, hidden, loops, seeks, dropped } = this.#watch;
     return {
       visible_ms: Math.round(visible),
@@ -77,7 +90,7 @@ export class StairPair extends HTMLElement {
     };
   }
 
-  /** Puts two clips on, at their first frame, and plays them unless stillness is wanted. */
+  /** Puts two clips on, at their first frame, and plays them, once nothing lies over them, unless stillness is wanted. */
   show(left, right) {
     this.#clips = { left, right };
     this.#drawn = { left: -1, right: -1 };
@@ -94,12 +107,14 @@ export class StairPair extends HTMLElement {
     const scrub = this.querySelector('[data-do="scrub"]');
     if (scrub) scrub.max = String(this.#longer().frames.length - 1);
     this.#draw();
-    this.#playing = !StairPair.wantsStillness && !this.hasAttribute('still');
+    const isToPlay = !StairPair.wantsStillness && !this.hasAttribute('still');
+    this.#playing = isToPlay && !this.#isCovered;
+    this.#playsOn = isToPlay && this.#isCovered;
     this.#tell();
     requestAnimationFrame(() => {
-      this.#watch.since = performance.now();
-      this.#watch.started = true;
+      this.#watch.isDrawn = true;
       this.dispatchEvent(new CustomEvent('firstframe'));
+      this.#startWatch();
     });
     this.#run();
   }
@@ -107,7 +122,27 @@ export class StairPair extends HTMLElement {
   /** Takes the clips off; their memory stays with whoever loaded them. */
   clear() {
     this.#playing = false;
+    this.#playsOn = false;
     this.#clips = { left: null, right: null };
+  }
+
+  /** Something lies over the pair: until `uncover` it holds still and no time counts. */
+  cover() {
+    if (this.#isCovered) return;
+    this.#countTime();
+    this.#isCovered = true;
+    this.#playsOn = this.#playing;
+    if (this.#playing) this.toggle();
+  }
+
+  /** The pair can be seen again, and goes on as it was. */
+  uncover() {
+    if (!this.#isCovered) return;
+    this.#countTime();
+    this.#isCovered = false;
+    if (this.#playsOn && !this.#playing) this.toggle();
+    this.#playsOn = false;
+    this.#startWatch();
   }
 
   /** One of the controls by its name. */
@@ -169,6 +204,15 @@ export class StairPair extends HTMLElement {
   #changeSpeed(by) {
     const at = SPEEDS.indexOf(this.#speed) + by;
     this.setSpeed(SPEEDS[Math.max(0, Math.min(SPEEDS.length - 1, at))]);
+  }
+
+  /** On a slider that keys have led to; one that was dragged leaves its arrows to the page. */
+  #stepByArrow(event) {
+    const n = ARROWS[event.key];
+    const isModified = event.ctrlKey || event.metaKey || event.altKey;
+    if (!n || isModified || !isSlider(event.target) || this.#isDragged || !event.target.matches(':focus-visible')) return;
+    event.preventDefault();
+    this.step(n);
   }
 
   #canvas(side) {
@@ -234,7 +278,7 @@ export class StairPair extends HTMLElement {
   #tell() {
     const n = this.#longer()?.frames.length ?? 0;
     const scrub = this.querySelector('[data-do="scrub"]');
-    if (scrub && document.activeElement !== scrub) scrub.value = String(this.frame);
+    if (scrub && !scrub.matches(':active')) scrub.value = String(this.frame);
     scrub?.setAttribute('aria-valuetext', `frame ${this.frame + 1} of ${n}`);
     const toggle = this.querySelector('[data-do="toggle"]');
     if (toggle && toggle.getAttribute('aria-label') !== (this.#playing ? 'Pause' : 'Play')) {
@@ -249,14 +293,25 @@ export class StairPair extends HTMLElement {
   }
 
   #visibilityChanged = () => {
-    this.#countVisibleTime(document.visibilityState === 'visible');
+    this.#countTime(document.visibilityState === 'visible');
   };
 
-  /** Adds the time since the last look to visible or hidden; `wasHidden` says which it was. */
-  #countVisibleTime(wasHidden = document.visibilityState !== 'visible') {
-    if (!this.#watch.started) return;
+  /** Time counts from when the pair is drawn with nothing over it. */
+  #startWatch() {
+    if (this.#isCovered || !this.#watch.isDrawn || this.#watch.isStarted) return;
+    this.#watch.since = performance.now();
+    this.#watch.isStarted = true;
+    this.dispatchEvent(new CustomEvent('seen'));
+  }
+
+  /**
+   * Adds the time since the last look to visible or hidden, or to neither when something lay over
+   * the pair; `wasHidden` says which it was.
+   */
+  #countTime(wasHidden = document.visibilityState !== 'visible') {
+    if (!this.#watch.isStarted) return;
     const now = performance.now();
-    this.#watch[wasHidden ? 'hidden' : 'visible'] += now - this.#watch.since;
+    if (!this.#isCovered) this.#watch[wasHidden ? 'hidden' : 'visible'] += now - this.#watch.since;
     this.#watch.since = now;
   }
 
@@ -280,8 +335,12 @@ export class StairPair extends HTMLElement {
   }
 }
 
+function isSlider(element) {
+  return element.dataset?.do === 'scrub';
+}
+
 function emptyWatch() {
-  return { started: false, since: 0, visible: 0, hidden: 0, loops: 0, seeks: 0, dropped: 0 };
+  return { isDrawn: false, isStarted: false, since: 0, visible: 0, hidden: 0, loops: 0, seeks: 0, dropped: 0 };
 }
 
 customElements.define('stair-pair', StairPair);

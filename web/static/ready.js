@@ -33,7 +33,7 @@ export function releasePair(pair) {
  */
 export class ReadyPairs extends EventTarget {
   #run;
-  #isAnswered;
+  #isSettled;
   #shown;
   #entries = [];
   #asking = null;
@@ -41,13 +41,13 @@ export class ReadyPairs extends EventTarget {
 
   /**
    * @param {string} run
-   * @param {(leaseId: string) => boolean} isAnswered leases that must not be shown again
-   * @param {() => string[]} shown leases that the page holds at this moment
+   * @param {(lease: object) => boolean} isSettled leases that must not be shown, or not again
+   * @param {() => object[]} shown leases that the page holds at this moment
    */
-  constructor(run, isAnswered, shown) {
+  constructor(run, isSettled, shown) {
     super();
     this.#run = run;
-    this.#isAnswered = isAnswered;
+    this.#isSettled = isSettled;
     this.#shown = shown;
     setInterval(() => this.#heartbeat(), HEARTBEAT_MS);
   }
@@ -64,18 +64,18 @@ export class ReadyPairs extends EventTarget {
 
   /** Takes the next pair, in the server's order, or null when it is not decoded yet. */
   take() {
-    for (const { lease } of [...this.#entries]) {
-      if (this.#isTaken(lease.lease_id)) this.drop(lease.lease_id);
-    }
+    this.dropTaken();
     if (!this.#entries[0]?.pair) return null;
     return this.#entries.shift().pair;
   }
 
-  /** Forgets a lease that is answered, here or elsewhere. */
-  drop(leaseId) {
-    const entry = this.#entries.find((candidate) => candidate.lease.lease_id === leaseId);
-    if (!entry) return;
-    this.#entries = this.#entries.filter((candidate) => candidate !== entry);
+  /** Forgets leases that are settled or on the page; called whenever one was settled. */
+  dropTaken() {
+    for (const entry of [...this.#entries]) if (this.#isTaken(entry.lease)) this.#drop(entry);
+  }
+
+  #drop(entry) {
+    this.#entries = this.#entries.filter((kept) => kept !== entry);
     releasePair(entry.pair);
   }
 
@@ -99,8 +99,8 @@ export class ReadyPairs extends EventTarget {
   }
 
   /** Compared when a reply is read, not when it was asked for: pairs are taken meanwhile. */
-  #isTaken(leaseId) {
-    return this.#isAnswered(leaseId) || this.#shown().includes(leaseId);
+  #isTaken(lease) {
+    return this.#isSettled(lease) || this.#shown().some((held) => held.lease_id === lease.lease_id);
   }
 
   async #ask() {
@@ -113,12 +113,10 @@ export class ReadyPairs extends EventTarget {
       return;
     }
     const offered = new Set(reply.leases.map((lease) => lease.lease_id));
-    for (const { lease } of [...this.#entries]) {
-      if (!offered.has(lease.lease_id)) this.drop(lease.lease_id);
-    }
+    for (const entry of [...this.#entries]) if (!offered.has(entry.lease.lease_id)) this.#drop(entry);
     for (const lease of reply.leases) {
       const isKnown = this.#entries.some((entry) => entry.lease.lease_id === lease.lease_id);
-      if (isKnown || this.#isTaken(lease.lease_id)) continue;
+      if (isKnown || this.#isTaken(lease)) continue;
       this.#prepare({ lease, pair: null });
     }
     this.#tell('state', reply);
@@ -129,7 +127,8 @@ export class ReadyPairs extends EventTarget {
     try {
       entry.pair = await preparePair(entry.lease);
     } catch (reason) {
-      this.drop(entry.lease.lease_id);
+      if (!this.#entries.includes(entry)) return;
+      this.#drop(entry);
       this.#tell('broken', { lease: entry.lease, reason });
       return;
     }
@@ -139,9 +138,9 @@ export class ReadyPairs extends EventTarget {
 
   async #heartbeat() {
     if (document.visibilityState !== 'visible') return;
-    const held = [...this.#shown(), ...this.#entries.map((entry) => entry.lease.lease_id)];
-    for (const id of held.filter((leaseId) => !this.#isAnswered(leaseId))) {
-      await request('POST', `/api/v1/leases/${id}/heartbeat`).catch(() => {
+    const held = [...this.#shown(), ...this.#entries.map((entry) => entry.lease)];
+    for (const lease of held.filter((candidate) => !this.#isSettled(candidate))) {
+      await request('POST', `/api/v1/leases/${lease.lease_id}/heartbeat`).catch(() => {
         // A lease that is gone is noticed when it is answered; the answer is kept aside, not lost.
       });
     }

@@ -7,6 +7,7 @@ const HEADINGS = {
   open: 'The next pair is on its way',
   saving: 'Saving your answer',
   offline: 'No connection to the server',
+  stranger: 'Who is answering?',
   drawing: 'Drawing the next clips',
   waiting: 'The agent is practising',
   held: 'Others are on the remaining pairs',
@@ -22,13 +23,14 @@ const $ = (id) => document.getElementById(id);
 
 export class WaitingCard {
   #run;
-  #hasCurve;
+  #isStudy;
   #curveAt = 0;
+  #hasFocus = false;
 
-  /** @param hasCurve whether whoever waits may see how the agent does */
-  constructor(run, hasCurve) {
+  /** @param isStudy fixed pairs and no agent: nobody sees how it does, and another task may follow */
+  constructor(run, isStudy) {
     this.#run = run;
-    this.#hasCurve = hasCurve;
+    this.#isStudy = isStudy;
   }
 
   /** @param isPreparing whether pairs are on their way to this page */
@@ -38,20 +40,32 @@ export class WaitingCard {
     card.dataset.kind = state.kind;
     // Questions that are open for the server, none of them left here: its word on the last answer is due.
     const isSaving = state.kind === 'open' && !isPreparing;
-    setText('waiting-title', HEADINGS[isSaving ? 'saving' : state.kind] ?? state.kind);
+    const isLast = this.#isStudy && state.kind === 'done';
+    const heading = HEADINGS[isSaving ? 'saving' : state.kind] ?? state.kind;
+    setText('waiting-title', isLast ? 'That was the last pair' : heading);
     const until = state.until ? ` Until ${timeOfDay(state.until).slice(0, 5)}.` : '';
-    setText('waiting-text', state.kind === 'open' ? '' : `${state.message ?? ''}${until}`);
+    const message = isLast ? 'All pairs here are answered. Go on, or go back to change an answer.' : `${state.message ?? ''}${until}`;
+    setText('waiting-text', state.kind === 'open' ? '' : message);
     const progress = state.phase?.progress;
     const hasProgress = typeof progress === 'number' && state.kind === 'waiting';
     $('waiting-bar').hidden = !hasProgress;
     if (hasProgress) $('waiting-bar').value = progress;
-    $('to-run').hidden = !['done', 'failed', 'paused'].includes(state.kind);
+    $('to-run').hidden = isLast || !['done', 'failed', 'paused'].includes(state.kind);
+    if (this.#isStudy) this.#offerWayOn(isLast);
     this.#tellCurve(state.kind);
+  }
+
+  /** The way on takes the focus once, when it appears: Enter goes on. */
+  #offerWayOn(isOffered) {
+    const link = $('to-seat');
+    link.hidden = !isOffered;
+    if (isOffered && !this.#hasFocus) link.focus(); // refused while the card is hidden or under a dialog
+    this.#hasFocus = isOffered && (this.#hasFocus || document.activeElement === link);
   }
 
   /** Success so far, while there is nothing else to look at. */
   async #tellCurve(kind) {
-    if (!this.#hasCurve || !['waiting', 'done'].includes(kind) || Date.now() - this.#curveAt < CURVE_MS) return;
+    if (this.#isStudy || !['waiting', 'done'].includes(kind) || Date.now() - this.#curveAt < CURVE_MS) return;
     this.#curveAt = Date.now();
     const events = await request('GET', `/api/v1/runs/${this.#run}/metrics`).catch(() => null);
     const points = events ? foldEvents(events).success : [];
