@@ -25,8 +25,8 @@ pub struct EnvSpec {
     pub stages: Vec<String>,
 }
 
-/// Ground truth from the environment. Learners never receive this type; evaluators and
-/// scripted teachers do.
+/// Ground truth from the environment: for evaluators, scripted teachers and the upper bound (SAC),
+/// for no other learner.
 #[derive(Debug, Clone, Copy, PartialEq, PartialOrd, Default, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct TaskReward(pub f64);
@@ -53,7 +53,7 @@ pub struct Step {
     /// Set on an episode's last step.
     pub end: Option<EpisodeEnd>,
     /// Index into [`EnvSpec::stages`] of the state after the step, where the task knows it.
-    /// For evaluation only.
+    /// For evaluation, and for the method `true_stage`.
     pub stage: Option<u8>,
 }
 
@@ -79,7 +79,7 @@ pub trait Environment: Send {
     /// What it takes to draw the present state later without physics, `[pose_size]`.
     fn pose(&self) -> Vec<f32>;
 
-    /// True stage of the present state, for evaluation only.
+    /// True stage of the present state, for evaluation and for the method `true_stage`.
     fn stage(&self) -> Option<u8> {
         None
     }

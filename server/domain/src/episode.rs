@@ -27,6 +27,7 @@ pub struct SegmentRecord {
     pub poses: Vec<Vec<f32>>,
     /// Ground truth of each step, `[H]`; for scripted teachers.
     pub task_rewards: Vec<crate::environment::TaskReward>,
-    /// True stage of each state, `[H]`, empty where the task does not know; for evaluation.
+    /// True stage of each state, `[H]`, empty where the task does not know; for evaluation and
+    /// for the method `true_stage`.
     pub stages: Vec<u8>,
 }

@@ -31,7 +31,8 @@ pub trait Beliefs {
     fn states(&mut self, candidates: &[Query]) -> Vec<Vec<f32>>;
     /// The same of all queries that were asked before.
     fn asked_states(&mut self) -> Vec<Vec<f32>>;
-    /// Mean of the four temporal distances between the ends of both segments, nats, `[N]`.
+    /// Stage gap of each query, in its approximator's unit, `[N]`; STAIR's is the mean of the four
+    /// temporal distances between the ends of both segments, nats.
     ///
     /// Source: STAIR, Eq. 8 (quadrilateral distance).
     fn stage_gap(&mut self, candidates: &[Query]) -> Vec<f32>;

@@ -25,7 +25,7 @@ pub use layers::{Layers, plainly};
 pub use presets::PRESETS;
 pub(crate) use presets::preset_names;
 
-/// Everything that decides what a run does.
+/// Everything that decides what a run does, but who answers.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct RunConfig {

@@ -235,8 +235,8 @@ fn make_center(asked: Option<&str>) -> Result<Center, FigureError> {
     choose("center", asked, &known)
 }
 
-/// How a method is written in a figure.
-fn shown_method(name: &str) -> String {
+/// How a method is written in figures, reports and pages.
+pub fn shown_method(name: &str) -> String {
     const ACRONYMS: [&str; 8] = [
         "stair", "pebble", "rune", "mrn", "rime", "qpa", "surf", "sac",
     ];

@@ -1,4 +1,5 @@
-//! Who worked on a run, and for how long: `history.json` in its folder, across stops and kills.
+//! Who worked on a run and answered it, and for how long: `history.json` in its folder, across stops
+//! and kills.
 
 use std::fs;
 use std::io;
@@ -29,9 +30,9 @@ pub struct Provenance {
 /// What ran when.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct RunHistory {
-    /// Of the program, in order, each once.
+    /// Of the program, in order, none twice in a row.
     pub revisions: Vec<String>,
-    /// Machines, in order, each once.
+    /// Machines, in order, none twice in a row.
     pub machines: Vec<String>,
     /// Wall time so far, seconds, waiting for answers included; of a part that was killed, up to
     /// its last checkpoint.

@@ -2,7 +2,8 @@
 //!
 //! Plain memory and append-only files, no tensors. Lanes are the parallel environments; an
 //! episode is a contiguous range of its lane, with one state more than it has steps, so that
-//! next observations need no copy. A MetaWorld step takes about 250 bytes.
+//! next observations need no copy. A step of window-open takes 226
+//! bytes.
 
 use std::ops::Range;
 

@@ -121,7 +121,7 @@ pub enum StoreError {
     /// The answer that is to be superseded is not the lease's present answer.
     #[error("answer {0} is not an answer of this lease")]
     NotSupersedable(String),
-    /// The study is not in the state for this.
+    /// The study is not in the state for this; an answer is kept aside.
     #[error("the study is {state}: {told}")]
     StudyState {
         /// `preparing`, `ready`, `open`, `closed` or `failed`.

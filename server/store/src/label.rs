@@ -65,7 +65,7 @@ pub struct Label {
     pub segment_len: i64,
     /// Disagreement when it was chosen.
     pub disagreement: Option<f64>,
-    /// Stage gap when it was chosen, nats.
+    /// Stage gap when it was chosen, in the unit of the method's gap.
     pub stage_gap: Option<f64>,
     /// Guidance that was shown.
     pub guidance_sha256: Option<String>,

@@ -168,8 +168,7 @@ impl Store {
         .await
     }
 
-    /// A query cannot be drawn. It is never shown; the server skips it, so that the run asks
-    /// another one in its place.
+    /// A query cannot be drawn. It is never shown; the server skips it, as a labeler would.
     ///
     /// # Errors
     /// When that cannot be stored.

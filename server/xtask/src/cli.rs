@@ -48,7 +48,7 @@ Usage: cargo xtask setup [--with-tests]
 
 Debian packages (g++, nasm, libvulkan1, mesa-vulkan-drivers) are installed with apt-get when that
 needs no password; otherwise the line to type is printed and the exit code is 2.
-libtorch 2.11.0 (545 MB to download, 0.5 GB kept) goes to .libtorch in this folder, unless
+libtorch 2.11.0 (544 MB to download, 0.5 GB kept) goes to .libtorch in this folder, unless
 LIBTORCH names one of your own. An interrupted download goes on where it can.
 
 Options:

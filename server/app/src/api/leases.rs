@@ -109,7 +109,7 @@ pub struct PhaseView {
 /// How far the asking is.
 #[derive(Serialize, ToSchema)]
 pub struct ProgressView {
-    /// Answers received, skips not counted.
+    /// Answers received, skips not counted; in a study skips count and practice does not.
     answered: u32,
     /// Answers in all.
     budget: u32,
@@ -124,9 +124,11 @@ pub struct ProgressView {
 /// The labeler's open leases, topped up; asked again they are the same.
 ///
 /// # Errors
-/// An unknown run; nobody has said who answers.
+/// An unknown run; nobody has said who answers; questions that are another's; a study that is not
+/// open.
 #[utoipa::path(post, path = "/api/v1/runs/{id}/leases", tag = "leases", params(("id" = i64, Path)), request_body = LeaseRequest,
-    responses((status = 200, body = LeasesView), (status = 401, body = Problem), (status = 404, body = Problem)))]
+    responses((status = 200, body = LeasesView), (status = 401, body = Problem),
+        (status = 403, body = Problem), (status = 404, body = Problem), (status = 409, body = Problem)))]
 pub async fn create(
     State(app): State<AppState>,
     who: Answerer,
@@ -186,7 +188,8 @@ pub struct HeartbeatView {
 #[derive(Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AnswerRequest {
-    /// `left`, `right`, `equal` or `skip`; `same`, `different` or `skip`.
+    /// `left`, `right`, `equal` or `skip`; `same`, `different` or `skip`. `pressed` in tables of
+    /// answers.
     answer: String,
     /// Why; needed for a skip.
     #[serde(default)]
@@ -238,10 +241,13 @@ pub struct AnswerView {
 /// Stores an answer, once however often it is sent. The reply comes after the commit.
 ///
 /// # Errors
-/// 409 another answer exists · 410 somebody else has the question; the answer is kept aside ·
-/// 422 not an answer to this question.
+/// 403 another labeler's lease · 404 an unknown lease · 409 another answer exists, or the study
+/// takes none (kept aside) · 410 somebody else has the question, or its pair was skipped (kept
+/// aside) · 422 not an answer to this question, a skip without a reason, or an answer that cannot be
+/// replaced.
 #[utoipa::path(put, path = "/api/v1/leases/{id}/answer", tag = "leases", params(("id" = String, Path)), request_body = AnswerRequest,
-    responses((status = 201, body = AnswerView), (status = 200, body = AnswerView), (status = 404, body = Problem),
+    responses((status = 201, body = AnswerView), (status = 200, body = AnswerView),
+        (status = 403, body = Problem), (status = 404, body = Problem),
         (status = 409, body = Problem), (status = 410, body = Problem), (status = 422, body = Problem)))]
 pub async fn answer(
     State(app): State<AppState>,

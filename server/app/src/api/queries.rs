@@ -16,7 +16,7 @@ use crate::state::AppState;
 pub struct TaskRewardsView {
     /// Round of asking, from 0.
     session: u32,
-    /// Place in the round, from 0.
+    /// Place in the round, from 0; `position` in tables of answers.
     index: u32,
     /// Of the segment on the left.
     left: Vec<f64>,

@@ -253,7 +253,7 @@ pub struct InvitationRequest {
     /// Days for which the links work.
     #[serde(default)]
     days: Option<u32>,
-    /// Instead of new places: a new link to this one, whoever sits there.
+    /// Instead of new places: a new link to the place of this `number`, whoever sits there.
     #[serde(default)]
     seat: Option<u32>,
 }
@@ -265,7 +265,7 @@ fn one() -> u32 {
 /// A link that works once.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct InvitationView {
-    /// The place.
+    /// The place's `number` among the study's seats.
     pub seat: u32,
     /// For one labeler; shown now and never again.
     pub link: String,

@@ -38,8 +38,9 @@ pub struct Args {
     /// noisy, equal, skip, coin
     #[arg(long, default_value = "oracle")]
     teacher: String,
-    /// A teacher token of the run [default: STAIR_TEACHER_TOKEN, or one that the server gives to
-    /// programs on its own machine]
+    /// A teacher token of the run [default: STAIR_TEACHER_TOKEN, or one that the server gives where
+    /// it wants no token of its own; else POST /api/v1/runs/ID/teacher-tokens with the server's
+    /// token makes one]
     #[arg(long)]
     token: Option<String>,
     /// Of the teacher's mistakes [default: the run's]

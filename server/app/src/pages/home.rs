@@ -7,6 +7,7 @@ use axum::extract::State;
 use axum::response::{Redirect, Response};
 use lab::config::{Layers, RunConfig};
 use lab::cost::time_here;
+use lab::figure::shown_method;
 use serde::Deserialize;
 use serde_json::{Map, json};
 
@@ -263,13 +264,12 @@ fn choosing(method: &lab::method::MethodEntry) -> &'static str {
     }
 }
 
-/// `stair` → `STAIR`; methods are acronyms, all but one.
+/// As figures write it, with a capital: `stair` → `STAIR`, `uniform` → `Uniform`.
 pub fn method_name(name: &str) -> String {
-    if name == "uniform" {
-        "Uniform".to_owned()
-    } else {
-        name.to_uppercase()
-    }
+    let shown = shown_method(name);
+    let mut letters = shown.chars();
+    let first = letters.next().map(|letter| letter.to_ascii_uppercase());
+    first.into_iter().chain(letters).collect()
 }
 
 fn teachers() -> Vec<Choice> {

@@ -293,7 +293,7 @@ async fn broken(app: &AppState, run: RunId) -> Result<Vec<String>, Problem> {
     let bad = app.store.bad_queries(run).await?;
     let lines = bad.iter().map(|query| {
         format!(
-            "A pair of round {} cannot be shown: {}. Another one is asked instead.",
+            "A pair of round {} cannot be shown: {}.",
             query.session + 1,
             query.trouble
         )

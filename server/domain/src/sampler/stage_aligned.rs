@@ -54,7 +54,7 @@ impl QuerySampler for StageAligned {
 /// `score = (c_stage − d) · (c_state + u)`, with `u`, `d` min-max scaled over the candidates.
 ///
 /// * `disagreement` – `[N]`, std over members of P(second ≻ first)
-/// * `stage_gap`    – `[N]`, nats; smaller is better aligned
+/// * `stage_gap`    – `[N]`, in any unit; smaller is better aligned
 ///
 /// All-equal inputs scale to zero. Higher is better.
 ///

@@ -65,7 +65,7 @@
 //!
 //! # Stages
 //! `return` while the object is held or at the goal; otherwise `fetch` while ‖b − j‖ ≤ 0.35, and
-//! `go` beyond. For evaluation only.
+//! `go` beyond. For evaluation, and for the method `true_stage`.
 
 use domain::environment::{EnvError, EnvSpec, Environment, Step};
 use domain::random::{Rng, Stream};
