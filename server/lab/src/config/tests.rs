@@ -116,6 +116,7 @@ fn a_method_has_constants_of_its_own_for_some_tasks() {
     assert_eq!(mrn("go-fetch-return"), 500);
     let least = |task| resolved("rime", task).denoising.least_epochs;
     assert_eq!(["window-open", "quadruped-run"].map(least), [5, 15]);
+    assert_eq!(least("go-fetch-return"), 50);
     let surf = |task| {
         let config = resolved("surf", task).semi_supervised;
         (config.passes, config.unlabeled_per_query)
