@@ -21,9 +21,13 @@ pub(crate) struct Pool {
 impl Pool {
     /// Whether there is anything to ask about.
     pub(crate) fn holds_a_pair(&self, replay: &Replay) -> bool {
-        let least = if self.pairs_with_itself { 1 } else { 2 };
-        let segments = self.episodes(replay).into_iter();
-        segments.map(|(_, n)| u64::from(n)).sum::<u64>() >= least
+        self.makes_a_pair(&self.episodes(replay))
+    }
+
+    /// * `episodes` – as [`Pool::episodes`] counts them
+    fn makes_a_pair(&self, episodes: &[(EpisodeId, u32)]) -> bool {
+        let n_segments: u64 = episodes.iter().map(|(_, n)| u64::from(*n)).sum();
+        n_segments >= if self.pairs_with_itself { 1 } else { 2 }
     }
 
     /// The episodes that are long enough, each with the number of places where a segment fits.
@@ -43,10 +47,10 @@ impl Pool {
     /// Both episodes are drawn with replacement and independently, starts uniformly over all
     /// places where a segment fits. Fewer than `n` pairs only where no two segments fit.
     pub(crate) fn draw(&self, replay: &Replay, n: usize, rng: &mut Rng) -> Vec<Query> {
-        if !self.holds_a_pair(replay) {
+        let long_enough = self.episodes(replay);
+        if !self.makes_a_pair(&long_enough) {
             return Vec::new();
         }
-        let long_enough = self.episodes(replay);
         let mut segment = || {
             let (episode, n_starts) = long_enough[rng.below(long_enough.len())];
             Segment {

@@ -159,18 +159,19 @@ impl<'a> Sitting<'a> {
     /// # Errors
     /// [`TeacherMisfit`], where another one has or it is not known who.
     pub fn answered_by(&mut self, wanted: Option<&str>) -> Result<&str, TeacherMisfit> {
-        let there = self.before.teacher.take();
-        let teacher = match (there, wanted) {
-            (Some(there), Some(wanted)) if there != wanted => {
-                self.before.teacher = Some(there.clone());
-                let wanted = wanted.to_owned();
-                return Err(TeacherMisfit::Another { there, wanted });
-            }
-            (Some(there), _) => there,
-            (None, Some(wanted)) => wanted.to_owned(),
-            (None, None) => return Err(TeacherMisfit::Unknown),
-        };
-        Ok(self.before.teacher.insert(teacher))
+        let there = &mut self.before.teacher;
+        if let (Some(there), Some(wanted)) = (there.as_deref(), wanted)
+            && there != wanted
+        {
+            return Err(TeacherMisfit::Another {
+                there: there.to_owned(),
+                wanted: wanted.to_owned(),
+            });
+        }
+        if there.is_none() {
+            *there = wanted.map(str::to_owned);
+        }
+        there.as_deref().ok_or(TeacherMisfit::Unknown)
     }
 
     /// The whole so far.

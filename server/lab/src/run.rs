@@ -337,8 +337,7 @@ impl Run {
         self.lanes
             .store(&actions, &rewards, &steps, &mut self.replay);
         self.progress.step = now;
-        if let Some(steering) = steering {
-            let latest = self.latest_answers();
+        if let Some((steering, latest)) = steering {
             let steered = self.learner.steer(&steering, &latest, &mut self.replay);
             updates.agent.push(steered);
         }
@@ -448,17 +447,18 @@ impl Run {
         self.preferences.n_preferred() + n_skipped
     }
 
-    /// Whether the rewards are moved by the critics on the way on from `step`, and how: after a
-    /// session that is due at the same step, so that the newest answers move them and no fit
-    /// follows at once.
-    fn steering(&self, step: u64) -> Option<SteeringConfig> {
+    /// Whether the rewards are moved by the critics on the way on from `step`, how, and by which
+    /// answers: after a session that is due at the same step, so that the newest answers move them
+    /// and no fit follows at once. Where all were skipped there is nothing to move them by.
+    fn steering(&self, step: u64) -> Option<(SteeringConfig, Vec<Labeled>)> {
         let earlier = step.saturating_sub(self.lanes.len() as u64);
-        let is_due = |steering: &SteeringConfig| Every(steering.every).is_crossed(earlier, step);
-        let may = || {
-            let has_answers = !self.latest_answers().is_empty(); // all may have been skipped
-            self.progress.n_fits > 0 && self.has_budget() && has_answers
-        };
-        self.method.steering.filter(|s| is_due(s) && may())
+        let steering = self.method.steering?;
+        let is_due = Every(steering.every).is_crossed(earlier, step);
+        if !is_due || self.progress.n_fits == 0 || !self.has_budget() {
+            return None;
+        }
+        let latest = self.latest_answers();
+        (!latest.is_empty()).then_some((steering, latest))
     }
 
     /// A session's worth of the newest answers.
