@@ -2,8 +2,10 @@
 
 mod accessibility;
 mod driver;
+mod following;
 mod in_step;
 mod labeler;
 mod session;
 mod studies;
+mod trouble;
 mod weight;

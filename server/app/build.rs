@@ -1,7 +1,9 @@
 //! Link arguments for libtorch, the revision for `stair --version`, and the files of `web/static`
 //! and `assets/guidance` and the results of experiments inside the program.
 
+use std::collections::BTreeMap;
 use std::collections::hash_map::DefaultHasher;
+use std::ffi::OsStr;
 use std::fmt::Write as _;
 use std::hash::{Hash as _, Hasher as _};
 use std::path::{Path, PathBuf};
@@ -143,11 +145,19 @@ fn embed_results() {
     let mut files = Vec::new();
     collect(&root, &mut files);
     files.retain(|file| file.ends_with("results.jsonl"));
-    files.sort();
-    let mut table = String::from("&[\n");
+    let mut experiments: BTreeMap<String, &Path> = BTreeMap::new();
     for rows in &files {
-        let name = rows.parent().and_then(Path::file_name);
-        let name = name.expect("a file lies in a folder").to_string_lossy();
+        let name = result_name(&root, rows);
+        if let Some(other) = experiments.insert(name.clone(), rows) {
+            panic!(
+                "{} and {} would both be called {name}",
+                other.display(),
+                rows.display()
+            );
+        }
+    }
+    let mut table = String::from("&[\n");
+    for (name, rows) in &experiments {
         let grid = rows.with_file_name("experiment.toml");
         writeln!(
             table,
@@ -160,6 +170,15 @@ fn embed_results() {
     table.push_str("]\n");
     let out = PathBuf::from(variable("OUT_DIR")).join("results.rs");
     std::fs::write(&out, table).expect("cargo's output folder can be written");
+}
+
+/// `a-b` of `assets/results/a/b/results.jsonl`: one part of an address, and `b` below another folder
+/// is another name.
+fn result_name(root: &Path, rows: &Path) -> String {
+    let folder = rows.parent().expect("a file lies in a folder");
+    let below = folder.strip_prefix(root).expect("found below the root");
+    let parts: Vec<_> = below.iter().map(OsStr::to_string_lossy).collect();
+    parts.join("-")
 }
 
 fn collect(folder: &Path, files: &mut Vec<PathBuf>) {

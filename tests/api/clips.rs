@@ -1,4 +1,4 @@
-//! Clips: parts of them, for ever.
+//! Clips: parts of them, for ever, and what is told of one that is lost.
 
 use crate::support::TestApp;
 
@@ -32,4 +32,33 @@ fn a_clip_is_served_in_parts_and_never_changes() {
         None,
     )
     .expect(404);
+}
+
+#[test]
+fn a_clip_whose_bytes_are_gone_is_told_apart_from_a_server_that_fails() {
+    let app = TestApp::start(1);
+    let ada = app.labeler("Ada");
+    let leases = ada.leases(1);
+    let clip = leases[0]["left"]["clip"].as_str().expect("an address");
+    let file = clip.strip_prefix("/api/v1/clips/").expect("a name");
+    let path = app.data().join("clips").join(&file[..2]).join(file);
+    std::fs::remove_file(path).expect("a file");
+
+    let reply = ada.send("GET", clip, None).expect(410);
+    assert_eq!(reply.headers["content-type"], "application/problem+json");
+    assert_eq!(reply.headers["cache-control"], "no-store");
+    let told = reply.json();
+    assert_eq!(told["type"], "/problems/clip-gone", "{told}");
+    assert!(
+        told["detail"]
+            .as_str()
+            .is_some_and(|detail| detail.contains("data folder") && detail.contains("broken clip")),
+        "{told}"
+    );
+    let other = leases[0]["right"]["clip"].as_str().expect("an address");
+    ada.send("GET", other, None).expect(200);
+
+    let document = ada.send("GET", "/api/v1/openapi.json", None).expect(200);
+    let responses = &document.json()["paths"]["/api/v1/clips/{name}"]["get"]["responses"];
+    assert!(responses["410"].is_object(), "{responses}");
 }

@@ -1,10 +1,12 @@
 //! Runs, exports, events, and requests that do not fit.
 
 use std::io::{BufRead as _, BufReader, Write as _};
-use std::net::TcpStream;
+use std::net::{TcpListener, TcpStream};
 
 use serde_json::json;
+use store::Store;
 
+use crate::stories::server_process::stair;
 use crate::support::TestApp;
 
 #[test]
@@ -59,7 +61,11 @@ fn a_run_that_cannot_be_started_says_what_is_wrong() {
     refuse(json!({"task": "window-open", "preset": "quik"}), "quick");
     refuse(
         json!({"task": "window-open", "teacher": "orcale"}),
-        "oracle",
+        "did you mean 'oracle'",
+    );
+    refuse(
+        json!({"task": "window-open", "teacher": "humna"}),
+        "did you mean 'human'",
     );
     refuse(
         json!({"task": "window-open", "settings": {"agent": {"bach": 3}}}),
@@ -71,10 +77,51 @@ fn a_run_that_cannot_be_started_says_what_is_wrong() {
         "expected a whole number, 0 or more (line 1",
     );
     refuse(json!({"task": 3}), "expected text in quotes");
+    refuse(
+        json!({"task": "window-open", "settings": {"feedback": {"budget": 5_000_000_000_u64}}}),
+        "settings feedback.budget=5000000000: invalid value: integer `5000000000`, expected a whole number, at most 4294967295",
+    );
+    refuse(
+        json!({"task": "window-open", "seed": u64::MAX}),
+        "settings seed=18446744073709551615: a whole number is at most 9223372036854775807",
+    );
     all.send("GET", "/api/v1/runs/99", None).expect(404);
     all.send("GET", "/api/v1/runs/none", None).expect(404);
     all.send("DELETE", "/api/v1/runs", None).expect(405);
     all.send("GET", "/api/v1/nowhere", None).expect(404);
+}
+
+#[test]
+fn damage_to_a_runs_files_is_told_on_its_page() {
+    let damage = [
+        (
+            "damaged_checkpoint",
+            "checkpoint of step 300: it ends early",
+        ),
+        ("damaged_history", "it is no JSON. It is set aside"),
+    ];
+    let app = TestApp::start_with(1, |folder| {
+        let runtime = tokio::runtime::Runtime::new().expect("threads");
+        runtime.block_on(async {
+            let store = Store::open(folder).await.expect("a store");
+            let run = store.runs().await.expect("runs")[0].id;
+            for (kind, complaint) in damage {
+                let event = json!({"kind": kind, "complaint": complaint});
+                store
+                    .append_event(run, kind, &event)
+                    .await
+                    .expect("an event");
+            }
+        });
+    });
+    let path = format!("/runs/{}", app.run);
+    let page = app.stranger().send("GET", &path, None).expect(200).text;
+    for told in [
+        "A damaged checkpoint was passed over: checkpoint of step 300: it ends early.",
+        "time and revisions was damaged: it is no JSON. It is set aside.",
+    ] {
+        assert!(page.contains(told), "{page}");
+    }
 }
 
 #[test]
@@ -141,6 +188,32 @@ fn both_exports_hold_the_same_rows() {
         None,
     )
     .expect(422);
+}
+
+#[test]
+fn a_table_that_breaks_off_leaves_no_file_behind() {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let server = format!("http://{}", listener.local_addr().expect("an address"));
+    std::thread::spawn(move || {
+        let (mut stream, _) = listener.accept().expect("a request");
+        let request = BufReader::new(&stream).lines().map_while(Result::ok);
+        request.take_while(|line| !line.is_empty()).for_each(drop);
+        let reply = "HTTP/1.1 200 OK\r\ncontent-length: 100\r\n\r\nanswer_id,";
+        write!(stream, "{reply}").expect("a part of a table");
+    });
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let output = stair()
+        .args(["export", "--run", "1", "--server", &server])
+        .args(["--out", "answers.csv"])
+        .current_dir(folder.path())
+        .stderr(std::process::Stdio::piped())
+        .output()
+        .expect("stair export");
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{told}");
+    assert!(told.contains("broke off after 10 bytes"), "{told}");
+    let left = std::fs::read_dir(folder.path()).expect("a folder").count();
+    assert_eq!(left, 0, "files that look like the table");
 }
 
 #[test]

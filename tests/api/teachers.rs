@@ -45,6 +45,18 @@ fn a_teacher_token_opens_what_teaching_takes_and_nothing_else() {
 }
 
 #[test]
+fn who_answers_is_told_that_a_teacher_token_is_for_the_researcher_to_make() {
+    let app = TestApp::start(1);
+    let path = format!("/api/v1/runs/{}/teacher-tokens", app.run);
+    for who in [app.labeler("Ada"), app.program()] {
+        let told = who.send("POST", &path, Some(&json!({}))).expect(403).json();
+        assert_eq!(told["type"], "/problems/researchers-only", "{told}");
+        let detail = told["detail"].as_str().expect("words");
+        assert!(detail.contains("send the server's token"), "{detail}");
+    }
+}
+
+#[test]
 fn a_query_that_has_no_number_is_a_problem_that_names_it() {
     let app = TestApp::start(1);
     let path = "/api/v1/queries/abc/task-rewards";

@@ -18,7 +18,7 @@ pub(crate) struct Desk {
     pub(crate) server: ServerProcess,
     /// The run's number.
     pub(crate) run: RunId,
-    _folder: tempfile::TempDir,
+    folder: tempfile::TempDir,
 }
 
 impl Desk {
@@ -30,8 +30,14 @@ impl Desk {
         Self {
             server,
             run,
-            _folder: folder,
+            folder,
         }
+    }
+
+    /// Loses the bytes of all clips, as a data folder has that was copied without them.
+    pub(crate) fn lose_clips(&self) {
+        let clips = self.folder.path().join("clips");
+        std::fs::remove_dir_all(clips).expect("a folder with clips");
     }
 
     /// Address of a page.

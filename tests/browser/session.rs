@@ -7,14 +7,14 @@ use serde_json::json;
 use super::driver::{Browser, Scheme};
 use super::labeler::{Desk, answer, answer_any, say_name, until_judged};
 
-const SCREEN: (u32, u32) = (1280, 900);
-const ESCAPE: &str = "\u{E00C}";
+pub(super) const SCREEN: (u32, u32) = (1280, 900);
+pub(super) const ESCAPE: &str = "\u{E00C}";
 const TAB: char = '\u{E004}';
 const LEFT: char = '\u{E012}';
 const RIGHT: char = '\u{E014}';
 
 /// Everything is answered, and the server knows.
-const IS_DONE: &str = "document.body.dataset.stage === 'waiting' && document.querySelector('#waiting').dataset.kind === 'done'";
+pub(super) const IS_DONE: &str = "document.body.dataset.stage === 'waiting' && document.querySelector('#waiting').dataset.kind === 'done'";
 const IS_KEPT_HERE: &str = "document.querySelector('#saved').textContent.includes('kept here')";
 
 #[tokio::test(flavor = "multi_thread")]
@@ -418,7 +418,7 @@ async fn a_double_click_and_a_second_tab_make_no_second_label() {
 }
 
 /// Until nothing that was answered in this browser is unsent.
-async fn wait_until_stored(browser: &Browser) {
+pub(super) async fn wait_until_stored(browser: &Browser) {
     for _ in 0..1_000 {
         if n_unsent(browser).await == 0 {
             return;
@@ -429,7 +429,7 @@ async fn wait_until_stored(browser: &Browser) {
 }
 
 /// Answers that this browser keeps for the server.
-async fn n_unsent(browser: &Browser) -> usize {
+pub(super) async fn n_unsent(browser: &Browser) -> usize {
     let n_unsent = "return new Promise((resolve, reject) => {
         const opening = indexedDB.open('stair', 1);
         opening.onerror = () => reject(opening.error);

@@ -91,6 +91,9 @@ async fn answers_everything(name: &str, key: &str, (n_practice, n): (usize, usiz
     browser.until(&drawn).await;
     let results = browser.text("[aria-labelledby=results-title]").await;
     assert!(results.contains("same answer to a repeat"), "{results}");
+    let names = "[...document.querySelectorAll('.wide')].map((table) => table.matches('[tabindex=\"0\"][role=region]') && table.ariaLabel)";
+    let names = browser.value(names).await;
+    assert_eq!(names, json!(["Table of pairs", "Table of results"])); // keys scroll them
     browser.goto(&link).await;
     assert!(browser.text("h1").await.contains("over"));
 }

@@ -261,6 +261,7 @@ fn an_experiment_that_does_not_fit_is_named_with_its_line() {
         &["empty.toml", "line 5", "nothing to run"],
     );
     expect(&run("nowhere.toml"), here, &["nowhere.toml"]);
+    expect(&run("mine/grid"), here, &["cannot read mine/grid"]);
     expect(
         &run("metaword"),
         here,

@@ -157,6 +157,19 @@ fn look_at_the_pages(here: &Path) {
     assert!(page("/experiments/empty").contains("No run is finished yet"));
 }
 
+/// As after `stair experiment run robodesk --out robodesk`.
+#[test]
+fn a_folder_does_not_hide_the_grid_of_its_name() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    std::fs::create_dir(folder.path().join("robodesk")).expect("a folder");
+    let mut command = stair();
+    command
+        .args(["experiment", "check", "robodesk"])
+        .current_dir(folder.path());
+    let told = said(command);
+    assert!(told.contains("push-green.stair.oracle.1"), "{told}");
+}
+
 #[test]
 fn a_run_that_fails_is_marked_and_stops_no_other() {
     let folder = tempfile::tempdir().expect("a temporary folder");

@@ -1,5 +1,8 @@
 // Talks to the server: JSON in, JSON out, problems as errors with words for people.
 
+/** No reply is waited for longer. */
+const TIMEOUT_MS = 20_000;
+
 /** The server understood and said no. `body` is its problem document (RFC 9457). */
 export class Problem extends Error {
   constructor(status, body) {
@@ -27,12 +30,24 @@ export async function request(method, url, body) {
     body: body === undefined ? undefined : JSON.stringify(body),
     credentials: 'same-origin',
     cache: 'no-store',
-    signal: AbortSignal.timeout(20_000),
+    signal: inTime(),
   });
-  const text = await response.text();
-  const parsed = readJson(text);
-  if (!response.ok) throw new Problem(response.status, parsed ?? { title: text.slice(0, 200) });
+  if (!response.ok) throw await problemOf(response);
+  const parsed = readJson(await response.text());
+  if (parsed === null) throw new TypeError('not a reply of this server'); // of a hotel's, say, that wants a login first
   return parsed;
+}
+
+/** Ends a request that takes too long, or before that once `cancelled` says so. */
+export function inTime(cancelled = null) {
+  const late = AbortSignal.timeout(TIMEOUT_MS);
+  return cancelled ? AbortSignal.any([late, cancelled]) : late;
+}
+
+/** What a reply that is not ok says. @returns {Promise<Problem>} */
+export async function problemOf(response) {
+  const text = await response.text();
+  return new Problem(response.status, readJson(text) ?? { title: text.slice(0, 200) });
 }
 
 function readJson(text) {

@@ -48,6 +48,7 @@ export function addEvent(curves, event) {
       push('sessions', event.session);
       break;
     case 'session_closed':
+    case 'refitted':
       push('accuracy', event.accuracy);
       push('labels', event.labels);
       break;
@@ -124,6 +125,11 @@ export function compact(value) {
   if (size >= 1e6) return `${trim(value / 1e6)}M`;
   if (size >= 1e3) return `${trim(value / 1e3)}k`;
   return size >= 10 || Number.isInteger(value) ? String(Math.round(value)) : value.toFixed(2);
+}
+
+/** `35 %` of 0.35. */
+export function percent(value) {
+  return `${Math.round(value * 100)} %`;
 }
 
 function trim(value) {

@@ -1,7 +1,8 @@
 // Loads a clip and decodes every frame of it once, so that any frame can be shown at any moment.
+import { inTime, problemOf } from './api.js';
 import { readMp4 } from './mp4.js';
 
-/** A clip whose bytes arrived but cannot be shown; loading it again would not help. */
+/** A clip that is gone, or whose bytes arrived but cannot be shown; loading it again would not help. */
 export class BrokenClip extends Error {}
 
 /** All frames of a clip, ready to draw. */
@@ -37,13 +38,20 @@ export class Clip {
 /**
  * @param {string} url of an MP4 file
  * @param {{fps?: number, n_frames?: number}} [known] what the server said about it
- * @returns {Promise<Clip>} rejects with BrokenClip, or TypeError when the network failed or the
+ * @param {AbortSignal} [cancelled] nobody waits for it any more
+ * @returns {Promise<Clip>} rejects with BrokenClip; with anything else where it may be there later: the
+ *   network failed or took too long, somebody on the way is busy or answers instead of the server, or the
  *   server does not know who asks
  */
-export async function loadClip(url, known = {}) {
-  const response = await fetch(url);
-  if (response.status >= 500 || response.status === 401) throw new TypeError(`the server answered ${response.status}`);
-  if (!response.ok) throw new BrokenClip(`the clip is not there (${response.status})`);
+export async function loadClip(url, known = {}, cancelled = null) {
+  const response = await fetch(url, { signal: inTime(cancelled) });
+  if (!response.ok) {
+    const problem = await problemOf(response);
+    if (problem.isPassing || problem.status === 401) throw problem;
+    throw new BrokenClip(`the clip is not there: ${problem.body.title || problem.status}`);
+  }
+  const isClip = response.headers.get('content-type')?.startsWith('video/');
+  if (!isClip) throw new TypeError('not a reply of this server'); // as of a proxy that wants a login first
   const bytes = await response.arrayBuffer();
   try {
     return await decodeExactly(bytes);
@@ -51,6 +59,20 @@ export async function loadClip(url, known = {}) {
     console.info('frames are taken from a video element instead:', reason.message);
     return decodeBySeeking(bytes, known);
   }
+}
+
+/**
+ * Both clips of a pair, or neither: where one fails, the other's memory is given back.
+ *
+ * @param {Promise<Clip | null>[]} loading
+ * @returns {Promise<(Clip | null)[]>} rejects with what broke one of them for good, if anything did
+ */
+export async function bothClips(loading) {
+  const results = await Promise.allSettled(loading);
+  const failures = results.filter(({ status }) => status === 'rejected').map(({ reason }) => reason);
+  if (failures.length === 0) return results.map(({ value }) => value);
+  for (const { value } of results) value?.close();
+  throw failures.find((reason) => reason instanceof BrokenClip) ?? failures[0];
 }
 
 async function decodeExactly(bytes) {
@@ -122,7 +144,7 @@ async function decodeBySeeking(bytes, known) {
     return new Clip(frames, fps);
   } catch (reason) {
     for (const frame of frames) frame.close();
-    throw new BrokenClip(reason.message);
+    throw new BrokenClip(`the browser could not show it: ${reason.message}`);
   } finally {
     video.removeAttribute('src');
     video.load();

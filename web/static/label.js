@@ -1,10 +1,12 @@
 // The labeler's page: one key stores the answer and shows the next pair.
+import { recall, remember } from './choices.js';
 import { Outbox } from './outbox.js';
+import { $ } from './page.js';
 import './pair.js';
 import { preparePair, ReadyPairs, releasePair } from './ready.js';
 import { Settled } from './settled.js';
 import { WaitingCard } from './waiting.js';
-import { announce, notice, tellKnown, tellSaved, tellUndelivered, tellUnsaved, tellWaitingAnswers } from './words.js';
+import { announce, notice, tellAllSent, tellKnown, tellSaved, tellUndelivered, tellUnsaved, tellWaitingAnswers } from './words.js';
 
 const KEYS = {
   preference: { 1: 'left', ArrowLeft: 'left', 2: 'right', ArrowRight: 'right', 3: 'equal', ArrowDown: 'equal' },
@@ -16,8 +18,11 @@ const WORDS = { left: 'left is better', right: 'right is better', equal: 'about 
 const TOO_SOON_MS = 150;
 /** How often a waiting page asks whether there is something to do. */
 const WAITING_MS = 1_000;
+/** Who goes back to a pair that is longer on its way is offered to stay. */
+const SLOW_MS = 500;
+/** A clip that cannot be shown is passed over again, where this browser could not keep that it was. */
+const PASS_AGAIN_MS = 5_000;
 
-const $ = (id) => document.getElementById(id);
 const page = $('label');
 const run = page.dataset.run;
 const player = $('pair');
@@ -34,20 +39,24 @@ let isChanging = false;
 /** Pair that waits, prepared, while an answered one is changed. */
 let interrupted = null;
 let history = [];
-/** An answered pair is being fetched again; what is on stays on and takes no answer. */
-let isTurningBack = false;
+/** Ends the wait for an answered pair that is fetched again; till then what is on stays on and takes no answer. */
+let turningBack = null;
 /** When the pair that is on was first there with nothing over it. */
 let shownAt = 0;
 let pressedAt = 0;
 let settled;
-let usesShortcuts = localStorage.getItem('stair-shortcuts') !== 'off';
+let usesShortcuts = recall('stair-shortcuts') !== 'off';
 let outbox;
+/** This browser's other tabs, told of answers. */
+let tabs;
 let ready;
 
 async function start() {
-  outbox = await Outbox.open(run);
-  history = await outbox.history();
-  settled = new Settled(await outbox.answeredLeases(), history);
+  try {
+    await openKept();
+  } catch (reason) {
+    return cannotStart(reason);
+  }
   const shown = () => [current, interrupted].filter(Boolean).map((pair) => pair.lease);
   ready = new ReadyPairs(run, (lease) => settled.has(lease), shown);
   listen();
@@ -58,11 +67,27 @@ async function start() {
   proceed();
 }
 
+/** What this browser keeps of answers. */
+async function openKept() {
+  outbox = await Outbox.open(run);
+  tabs = new BroadcastChannel('stair-answered');
+  history = await outbox.history();
+  settled = new Settled(await outbox.answeredLeases(), history);
+}
+
+/** No answer is asked for that could be lost. */
+function cannotStart(reason) {
+  console.error('answers cannot be kept:', reason);
+  $('help').hidden = true; // nothing to press does anything
+  waiting.tell({ kind: 'keepless', message: 'This browser keeps no data for this site. Allow it, or use another browser.' }, false);
+  setStage('waiting');
+}
+
 // --- showing -----------------------------------------------------------------------------------
 
 /** Puts the next prepared pair on, or says what is being waited for. */
 function proceed() {
-  if (current || isTurningBack) return;
+  if (current || turningBack) return;
   const next = interrupted ?? ready.take();
   interrupted = null;
   if (next) show(next, null);
@@ -124,7 +149,7 @@ function setShownAt(time) {
 /** Stores an answer in the browser, shows what comes next, and lets the outbox send it. */
 function answer(word, input, reason = null, pressed = performance.now()) {
   const pair = current;
-  if (!pair || isTurningBack || performance.now() - shownAt < TOO_SOON_MS) return;
+  if (!pair || turningBack || performance.now() - shownAt < TOO_SOON_MS) return;
   const body = {
     answer: word,
     reason,
@@ -132,6 +157,7 @@ function answer(word, input, reason = null, pressed = performance.now()) {
     timing: { ...player.watched, input },
   };
   const wasChange = isChanging;
+  const before = wasChange ? lastAnswer(pair.lease) : null;
   current = null;
   isChanging = false;
   pressedAt = pressed;
@@ -140,7 +166,13 @@ function answer(word, input, reason = null, pressed = performance.now()) {
   if (pair.lease.practice) tellPractice(pair.lease.practice, word);
   proceed();
   releasePair(pair);
-  kept.catch((failure) => notice(`This browser could not keep the answer: ${failure.message}`, true));
+  // Once it is kept, it is on its way, whatever was said of those before it meanwhile.
+  kept.then(tellUnsaved, (failure) => notKept(pair.lease, before, failure));
+}
+
+/** As far as this page knows. */
+function lastAnswer(lease) {
+  return history.find((row) => row.lease_id === lease.lease_id)?.answer ?? null;
 }
 
 /** What most people would say, right after the answer. */
@@ -161,11 +193,25 @@ async function keepFirst({ lease }, body) {
 }
 
 async function keepChange({ lease }, body) {
-  settle(lease, body.answer);
-  const row = history.find((kept) => kept.lease_id === lease.lease_id);
-  if (row) row.answer = body.answer;
+  noteChange(lease, body.answer);
   await outbox.change(lease, body);
   tabs.postMessage({ lease, answer: body.answer });
+}
+
+function noteChange(lease, word) {
+  settle(lease, word);
+  const row = history.find((kept) => kept.lease_id === lease.lease_id);
+  if (row) row.answer = word;
+}
+
+/** The answer is lost: the one before it stands, or none does and the pair is asked about again. */
+async function notKept(lease, before, failure) {
+  const then = before ? `It is still: ${WORDS[before]}` : 'The pair is shown again';
+  notice(`This browser could not keep the answer (${failure.message}). ${then}.`, true);
+  if (before) noteChange(lease, before);
+  else forgetAnswer(lease);
+  refill();
+  if (await outbox.isEmpty().catch(() => true)) tellAllSent();
 }
 
 /** Notes an answer, and lets go of what waits here and is settled by it. */
@@ -192,32 +238,60 @@ function tellUndo() {
 /** Goes back to the answered pair before the one that is on, or the last one. */
 async function undo() {
   const row = undoable();
-  if (!row || isTurningBack) return;
-  isTurningBack = true;
+  if (!row || turningBack) return;
+  const turning = new AbortController();
+  turningBack = turning;
+  setTimeout(() => { if (turningBack === turning) offerToStay(true); }, SLOW_MS);
   try {
-    const pair = await preparePair(row.lease);
+    const pair = await preparePair(row.lease, turning.signal);
+    const before = await standing(row);
+    if (turning.signal.aborted) return releasePair(pair);
     if (isChanging) releasePair(current);
     else interrupted = current ?? interrupted;
-    await showAgain(pair, row);
+    show(pair, before);
+    announce(`Back to a pair you answered: ${WORDS[before]}. Answer again to change it.`);
   } catch (reason) {
+    if (turning.signal.aborted) return;
     history = history.filter((kept) => kept !== row); // the next press goes further back
     notice(`That pair can no longer be shown: ${reason.message}`, true);
   } finally {
-    isTurningBack = false;
-    if (!current) proceed();
-    tellUndo();
+    if (turningBack === turning) turnedBack();
   }
 }
 
-async function showAgain(pair, row) {
-  const [fresh] = (await outbox.history()).filter((kept) => kept.lease_id === row.lease_id);
-  show(pair, fresh?.answer ?? row.answer);
-  announce(`Back to a pair you answered: ${WORDS[row.answer]}. Answer again to change it.`);
+/** The newest answer to a pair, given here or in another tab. */
+async function standing(row) {
+  const kept = await outbox.history().catch(() => []);
+  return kept.find((fresh) => fresh.lease_id === row.lease_id)?.answer ?? row.answer;
+}
+
+/** The answered pair is there, or is not waited for any more. */
+function turnedBack() {
+  turningBack = null;
+  offerToStay(false);
+  if (!current) proceed();
+  tellUndo();
+}
+
+/** Goes on with what is on, and does not wait for the answered pair. */
+function stayHere() {
+  turningBack?.abort();
+  if (turningBack) turnedBack();
+}
+
+/** A way out, beside the way back, while an answered pair is long on its way. */
+function offerToStay(isOffered) {
+  for (const button of document.querySelectorAll('[data-stay]')) {
+    if (!isOffered && button === document.activeElement) button.previousElementSibling.focus();
+    button.hidden = !isOffered;
+  }
+  if (isOffered) announce('That pair is still on its way. “Stay here” goes on without it.');
 }
 
 /** Leaves an answered pair as it was. */
 function leaveUnchanged() {
-  if (!isChanging || isTurningBack) return;
+  if (turningBack) return stayHere();
+  if (!isChanging) return;
   const leaving = current;
   current = null;
   isChanging = false;
@@ -225,15 +299,23 @@ function leaveUnchanged() {
   releasePair(leaving);
 }
 
+/** Nobody pressed anything: the page itself passes the pair over, and says why. */
 async function skipBroken({ lease, reason }) {
   settle(lease, 'skip');
   if (current && !isChanging && settled.has(current.lease)) takeOff();
-  await outbox.answer(lease, {
+  const body = {
     answer: 'skip',
-    reason: `the browser could not show a clip: ${reason.message}`,
+    reason: `passed over by the page: ${reason.message}`,
     guidance_sha256: page.dataset.guidance,
-    timing: { visible_ms: 0, hidden_ms: 0, loops: 0, seeks: 0, speed: 1, dropped_frames: 0, input: 'key' },
-  });
+    timing: { visible_ms: 0, hidden_ms: 0, loops: 0, seeks: 0, speed: 1, dropped_frames: 0, input: null },
+  };
+  try {
+    await outbox.answer(lease, body);
+  } catch (failure) {
+    notice(`One pair cannot be shown, and this browser could not keep a note of it (${failure.message}).`, true);
+    setTimeout(() => askAgain(lease), PASS_AGAIN_MS);
+    return;
+  }
   notice('One pair could not be shown and was passed over. The researcher is told.', true);
   refill();
 }
@@ -287,7 +369,7 @@ function uncovered() {
 
 /** Guidance comes before the first pair, and again when its words have changed. */
 function greet() {
-  if (localStorage.getItem('stair-guidance') === page.dataset.guidance) return;
+  if (recall('stair-guidance') === page.dataset.guidance) return;
   cover(guidance);
 }
 
@@ -303,8 +385,6 @@ function tellShortcuts() {
 }
 
 // --- input -------------------------------------------------------------------------------------
-
-const tabs = new BroadcastChannel('stair-answered');
 
 function listen() {
   document.addEventListener('keydown', keyPressed);
@@ -339,15 +419,14 @@ function listen() {
     refill();
   });
   tabs.addEventListener('message', ({ data }) => {
-    if (data.answer !== null) return answeredElsewhere(data);
-    forgetAnswer(data.lease);
-    refill();
+    if (data.answer !== null) answeredElsewhere(data);
+    else askAgain(data.lease);
   });
   for (const dialog of document.querySelectorAll('dialog')) dialog.addEventListener('close', uncovered);
-  guidance.addEventListener('close', () => localStorage.setItem('stair-guidance', page.dataset.guidance));
+  guidance.addEventListener('close', () => remember('stair-guidance', page.dataset.guidance));
   $('shortcuts').addEventListener('change', () => {
     usesShortcuts = $('shortcuts').checked;
-    localStorage.setItem('stair-shortcuts', usesShortcuts ? 'on' : 'off');
+    remember('stair-shortcuts', usesShortcuts ? 'on' : 'off');
     tellShortcuts();
   });
 }
@@ -383,6 +462,11 @@ function forgetAnswer(lease) {
   tellUndo();
 }
 
+function askAgain(lease) {
+  forgetAnswer(lease);
+  refill();
+}
+
 function keyPressed(event) {
   if (!usesShortcuts || event.defaultPrevented || event.ctrlKey || event.metaKey || event.altKey || event.repeat && !PLAYER_KEYS[event.key]) return;
   if (reasons.open) return reasonPressed(event);
@@ -416,6 +500,7 @@ function reasonPressed(event) {
 }
 
 function askReason() {
+  if (turningBack) return; // no answer is taken
   cover(reasons);
 }
 
@@ -434,6 +519,7 @@ function clicked(event) {
   else if (button.dataset.reason !== undefined) skip(button.value, input);
   else if (button.id === 'undo' || button.id === 'undo-waiting') undo();
   else if (button.id === 'unsure') askReason();
+  else if (button.dataset.stay !== undefined) stayHere();
   else if (button.id === 'leave') leaveUnchanged();
   else if (button.id === 'help') openGuidance();
   else if (button.dataset.close !== undefined) button.closest('dialog').close();

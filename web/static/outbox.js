@@ -2,7 +2,8 @@
 //
 // An answer is written to IndexedDB before it is sent, and taken out when it is acknowledged: a
 // lost connection, a closed lid, a restarted server or a lost cookie lose nothing. Sending twice
-// is harmless, the server stores an answer to a lease once.
+// is harmless, the server stores an answer to a lease once. Of acknowledged answers the newest of
+// each run stay, to be gone back to.
 import { Problem, request } from './api.js';
 
 /** Answered pairs that can be gone back to. */
@@ -37,7 +38,23 @@ export class Outbox extends EventTarget {
     const outbox = new Outbox();
     outbox.#run = run;
     outbox.#database = await openDatabase();
+    await outbox.#prune().catch((reason) => console.warn('old answers stay in this browser:', reason));
     return outbox;
+  }
+
+  /** Lets go of answers that the server has and that nobody can go back to. */
+  #prune() {
+    return this.#write(['answered', 'unsent'], (transaction) => {
+      const [answered, unsent] = ['answered', 'unsent'].map((name) => transaction.objectStore(name));
+      const unsentRows = unsent.getAll();
+      const answeredRows = answered.getAll();
+      answeredRows.onsuccess = () => {
+        const held = new Set(unsentRows.result.map((row) => row.lease_id)); // a change needs what it supersedes
+        for (const row of beyondHistory(answeredRows.result)) {
+          if (row.answer_id && !held.has(row.lease_id)) answered.delete(row.lease_id);
+        }
+      };
+    });
   }
 
   /** Sends what is unsent from before; whoever listens does so by now. */
@@ -57,12 +74,12 @@ export class Outbox extends EventTarget {
    * @returns {Promise<boolean>} false when another tab has answered this lease already
    */
   async answer(lease, body) {
-    const row = { lease_id: lease.lease_id, run: this.#run, lease, answer: body.answer, answer_id: null, at: Date.now() };
+    const row = this.#answered(lease, body);
     const isNew = await this.#write(['answered', 'unsent'], (transaction) => {
       transaction.objectStore('answered').add(row);
       transaction.objectStore('unsent').add({ lease_id: lease.lease_id, body, isChange: false });
     });
-    if (isNew) this.#sendSoon(0);
+    this.#sendSoon(0); // what the other tab has kept, too
     return isNew;
   }
 
@@ -72,11 +89,16 @@ export class Outbox extends EventTarget {
       const answered = transaction.objectStore('answered');
       const reading = answered.get(lease.lease_id);
       reading.onsuccess = () => {
-        answered.put({ ...reading.result, answer: body.answer });
+        answered.put({ ...(reading.result ?? this.#answered(lease, body)), answer: body.answer });
         transaction.objectStore('unsent').add({ lease_id: lease.lease_id, body, isChange: true });
       };
     });
     this.#sendSoon(0);
+  }
+
+  /** @returns {Answered} not acknowledged */
+  #answered(lease, body) {
+    return { lease_id: lease.lease_id, run: this.#run, lease, answer: body.answer, answer_id: null, at: Date.now() };
   }
 
   /**
@@ -220,10 +242,20 @@ export class Outbox extends EventTarget {
       const transaction = this.#database.transaction(stores, 'readwrite', { durability: 'strict' });
       transaction.oncomplete = () => resolve(true);
       transaction.onabort = () =>
-        transaction.error?.name === 'ConstraintError' ? resolve(false) : reject(transaction.error);
+        transaction.error?.name === 'ConstraintError' ? resolve(false) : reject(transaction.error ?? new Error('it was given up'));
       change(transaction);
     });
   }
+}
+
+/** Answers older than the newest `HISTORY` of their run. @param {Answered[]} rows */
+function beyondHistory(rows) {
+  const nOfRun = new Map();
+  const newestFirst = [...rows].sort((a, b) => b.at - a.at);
+  return newestFirst.filter(({ run }) => {
+    nOfRun.set(run, (nOfRun.get(run) ?? 0) + 1);
+    return nOfRun.get(run) > HISTORY;
+  });
 }
 
 /** Why an answer did not get through now but may later; null when the server has decided. */

@@ -3,8 +3,10 @@
 // Inside it the page writes two <canvas data-side="left|right">, and whichever controls it wants:
 // buttons with data-do="toggle|back|forward|slower|faster|restart", an <input type="range"
 // data-do="scrub">, an <output data-show="speed|frame">. With attributes `left` and `right`
-// (addresses of clips) it loads them itself once it is in view; with `still` it waits to be played.
-import { loadClip } from './clip.js';
+// (addresses of clips) it loads them itself once it is in view, and lets go of them when it leaves
+// the page; where that fails it says so, and tries again when it is played or comes into view again.
+// With `still` it waits to be played.
+import { bothClips, loadClip } from './clip.js';
 
 /** Times the recorded pace, slowest first. */
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4];
@@ -32,6 +34,8 @@ export class StairPair extends HTMLElement {
   #request = 0;
   #drawn = { left: -1, right: -1 };
   #observer = null;
+  /** Ends the loading of own clips; `null` until it begins, and where the page loads the clips. */
+  #loading = null;
   #watch = emptyWatch();
 
   connectedCallback() {
@@ -55,6 +59,7 @@ export class StairPair extends HTMLElement {
     this.#observer?.disconnect();
     cancelAnimationFrame(this.#request);
     this.#request = 0;
+    if (this.#loading) this.#letGo();
   }
 
   /** Whether the person asked their system for less motion. */
@@ -147,7 +152,7 @@ export class StairPair extends HTMLElement {
 
   /** One of the controls by its name. */
   do(what) {
-    if (!this.#longer()) return;
+    if (!this.#longer()) return this.#loadAgain();
     switch (what) {
       case 'toggle': return this.toggle();
       case 'back': return this.step(-1);
@@ -159,7 +164,7 @@ export class StairPair extends HTMLElement {
   }
 
   toggle() {
-    if (!this.#longer()) return;
+    if (!this.#longer()) return this.#loadAgain();
     this.#playing = !this.#playing;
     if (this.#playing && this.#seconds >= this.#longer().duration) this.#seconds = 0;
     this.#tell();
@@ -316,22 +321,55 @@ export class StairPair extends HTMLElement {
   }
 
   #loadWhenSeen() {
-    this.#observer = new IntersectionObserver(async ([entry]) => {
-      if (!entry.isIntersecting) {
-        if (this.#playing && this.hasAttribute('loaded')) this.toggle();
-        return;
-      }
-      if (this.hasAttribute('loaded')) return;
-      this.setAttribute('loaded', '');
-      try {
-        const sides = ['left', 'right'].map((side) => this.getAttribute(side));
-        const [left, right] = await Promise.all(sides.map((url) => (url ? loadClip(url) : null)));
-        this.show(left, right);
-      } catch (reason) {
-        this.setAttribute('broken', reason.message);
-      }
+    this.#observer = new IntersectionObserver(([entry]) => {
+      if (entry.isIntersecting) this.#load();
+      else if (this.#playing && this.hasAttribute('loaded')) this.toggle();
     });
     this.#observer.observe(this);
+  }
+
+  async #load() {
+    if (this.hasAttribute('loaded')) return;
+    this.setAttribute('loaded', '');
+    this.#tellTrouble(null);
+    const loading = new AbortController();
+    this.#loading = loading;
+    try {
+      const addresses = ['left', 'right'].map((side) => this.getAttribute(side));
+      const clips = await bothClips(addresses.map((url) => url && loadClip(url, {}, loading.signal)));
+      if (loading.signal.aborted) for (const clip of clips) clip?.close();
+      else this.show(...clips);
+    } catch (reason) {
+      if (loading.signal.aborted) return;
+      this.removeAttribute('loaded');
+      this.#tellTrouble(reason.message);
+    }
+  }
+
+  /** After a failure, when somebody wants to see it. */
+  #loadAgain() {
+    if (this.hasAttribute('broken')) this.#load();
+  }
+
+  /** @param {string | null} reason why there is nothing to see */
+  #tellTrouble(reason) {
+    this.querySelector('.trouble')?.remove();
+    this.toggleAttribute('broken', reason !== null);
+    if (reason === null) return;
+    const words = document.createElement('p');
+    words.className = 'trouble';
+    words.textContent = `These clips could not be loaded; press play to try again. (${reason})`;
+    this.append(words);
+  }
+
+  /** Gives the memory of its own clips back, those on their way too. */
+  #letGo() {
+    this.#loading.abort();
+    this.#loading = null;
+    const { left, right } = this.#clips;
+    this.clear();
+    for (const clip of [left, right]) clip?.close();
+    this.removeAttribute('loaded');
   }
 }
 

@@ -1,21 +1,27 @@
 // Pairs that are leased, fetched and decoded before anybody looks at them.
 import { Problem, request } from './api.js';
-import { BrokenClip, loadClip } from './clip.js';
+import { BrokenClip, bothClips, loadClip } from './clip.js';
 
 /** The pair on the page and two ahead. */
 const N_LEASES = 3;
 const HEARTBEAT_MS = 60_000;
 const RETRY_MS = 1_000;
 
-/** Fetches and decodes both clips of a lease; tries again while the network is away. */
-export async function preparePair(lease) {
+/**
+ * Fetches and decodes both clips of a lease; tries again while the network is away.
+ *
+ * @param {AbortSignal} [cancelled] nobody waits for the pair any more
+ * @returns {Promise<{lease: object, left: Clip, right: Clip}>} rejects with BrokenClip, or once cancelled
+ */
+export async function preparePair(lease, cancelled = null) {
   for (;;) {
-    const loading = [lease.left, lease.right].map((side) => loadClip(side.clip, side));
-    const results = await Promise.allSettled(loading);
-    const failure = results.find((result) => result.status === 'rejected')?.reason;
-    if (!failure) return { lease, left: results[0].value, right: results[1].value };
-    for (const result of results) result.value?.close();
-    if (failure instanceof BrokenClip) throw failure;
+    const loading = [lease.left, lease.right].map((side) => loadClip(side.clip, side, cancelled));
+    try {
+      const [left, right] = await bothClips(loading);
+      return { lease, left, right };
+    } catch (reason) {
+      if (reason instanceof BrokenClip || cancelled?.aborted) throw reason;
+    }
     await new Promise((resolve) => setTimeout(resolve, RETRY_MS));
   }
 }

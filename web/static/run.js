@@ -1,12 +1,11 @@
 // The researcher's page of one run: curves and state that follow the run as it goes.
 import { request, timeOfDay } from './api.js';
-import { addEvent, compact, drawCurve, emptyCurves } from './chart.js';
+import { addEvent, compact, drawCurve, emptyCurves, percent } from './chart.js';
+import { $, setText } from './page.js';
 import './pair.js';
 
-const page = document.getElementById('run');
+const page = $('run');
 const run = page.dataset.run;
-const $ = (id) => document.getElementById(id);
-const percent = (value) => `${Math.round(value * 100)} %`;
 const fixed = (value) => (Math.abs(value) < 10 ? value.toFixed(2) : compact(value));
 
 /** What each panel of the page shows; `id` is its <figure>. */
@@ -20,6 +19,9 @@ const PANELS = [
   { id: 'labels', format: compact, lines: [['answers', 'labels']] },
   { id: 'speed', format: compact, lines: [['steps a second', 'speed']] },
 ];
+
+/** Kinds of event after which the server draws other clips or complaints into the page. */
+const DRAWN = ['clips', 'answer', 'clip_failed', 'damaged_checkpoint', 'damaged_history'];
 
 const curves = emptyCurves();
 let isDrawing = false;
@@ -71,10 +73,10 @@ function listen() {
     addEvent(curves, event);
     if (isHere) drawSoon();
     if (event.kind !== 'metrics') tellStateSoon();
-    if (['clips', 'answer', 'clip_failed'].includes(event.kind)) tellClipsSoon();
+    if (DRAWN.includes(event.kind)) tellClipsSoon();
   };
   source.onmessage = take;
-  for (const kind of ['phase', 'metrics', 'session_offered', 'session_closed', 'evaluation', 'finished', 'failed', 'answer', 'clips', 'clip_failed', 'state']) {
+  for (const kind of ['phase', 'metrics', 'session_offered', 'session_closed', 'refitted', 'evaluation', 'finished', 'answer', 'clips', 'clip_failed', 'damaged_checkpoint', 'damaged_history', 'state']) {
     source.addEventListener(kind, take);
   }
   source.onopen = () => page.removeAttribute('data-offline');
@@ -127,10 +129,6 @@ function replaceIfChanged(id, fresh) {
   const [old, now] = [$(id), fresh.getElementById(id)];
   if (!old || !now || old.dataset.version === now.dataset.version) return;
   old.replaceWith(document.adoptNode(now));
-}
-
-function setText(id, text) {
-  if ($(id).textContent !== text) $(id).textContent = text;
 }
 
 start();

@@ -1,13 +1,14 @@
 // What a labeler reads while no pair is on: why, until when, and how the agent does so far.
 import { request, timeOfDay } from './api.js';
-import { drawCurve, foldEvents } from './chart.js';
-import { setText } from './words.js';
+import { drawCurve, foldEvents, percent } from './chart.js';
+import { $, setText } from './page.js';
 
 const HEADINGS = {
   open: 'The next pair is on its way',
   saving: 'Saving your answer',
   offline: 'No connection to the server',
   stranger: 'Who is answering?',
+  keepless: 'Answers cannot be kept here',
   drawing: 'Drawing the next clips',
   waiting: 'The agent is practising',
   held: 'Others are on the remaining pairs',
@@ -18,8 +19,6 @@ const HEADINGS = {
 
 /** The curve is asked for at most this often. */
 const CURVE_MS = 2_000;
-
-const $ = (id) => document.getElementById(id);
 
 export class WaitingCard {
   #run;
@@ -73,5 +72,3 @@ export class WaitingCard {
     if (points.length >= 2) drawCurve($('waiting-svg'), { series: [{ name: 'success', points }], range: [0, 1], format: percent });
   }
 }
-
-const percent = (value) => `${Math.round(value * 100)} %`;

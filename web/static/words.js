@@ -1,19 +1,52 @@
 // The labeler's page's small words: what is saved, what went wrong, what is read aloud.
 import { timeOfDay } from './api.js';
+import { $, setText } from './page.js';
 
-const $ = (id) => document.getElementById(id);
+/** Saving that takes no longer is not worth a word. */
+const SAVING_MS = 300;
 
-export function setText(id, text) {
-  if ($(id).textContent !== text) $(id).textContent = text;
-}
+let savingTimer = 0;
+/** When the last answer was stored that this page heard of. */
+let lastSaved = null;
 
+/** An answer is on its way. */
 export function tellUnsaved() {
   $('saved').dataset.state = 'sending';
+  savingTimer ||= setTimeout(tellSaving, SAVING_MS);
 }
 
+/** To be seen, not to be read aloud: on a slow connection it is so after every answer. */
+function tellSaving() {
+  savingTimer = 0;
+  const words = document.createElement('span');
+  words.setAttribute('aria-hidden', 'true');
+  words.textContent = 'saving…';
+  $('saved').dataset.state = 'sending';
+  $('saved').replaceChildren(words);
+}
+
+function stopSaving() {
+  clearTimeout(savingTimer);
+  savingTimer = 0;
+}
+
+/** One answer is stored; a newer one may be on its way, until `tellAllSent`. */
 export function tellSaved(storedAt) {
-  $('saved').dataset.state = 'saved';
-  setText('saved', `saved ${timeOfDay(storedAt)}`);
+  stopSaving();
+  lastSaved = storedAt;
+  showSaved();
+  savingTimer = setTimeout(tellSaving, SAVING_MS);
+}
+
+/** No answer of this browser is on its way, whoever sent the last one; some may be undelivered. */
+export function tellAllSent() {
+  stopSaving();
+  if ($('saved').dataset.state === 'sending' || $('undelivered').hidden) showSaved();
+}
+
+function showSaved() {
+  $('saved').dataset.state = lastSaved ? 'saved' : '';
+  setText('saved', lastSaved ? `saved ${timeOfDay(lastSaved)}` : '');
 }
 
 const WAITS = {
@@ -24,7 +57,8 @@ const WAITS = {
 
 /** @param {{count: number, why: 'offline'|'busy'|'stranger'|null}} waiting answers that do not get through now */
 export function tellWaitingAnswers({ count, why }) {
-  if (count === 0) return;
+  if (count === 0) return tellAllSent();
+  stopSaving();
   $('saved').dataset.state = 'unsent';
   setText('saved', WAITS[why](count === 1 ? '1 answer is kept here' : `${count} answers are kept here`));
 }
@@ -38,6 +72,7 @@ export function tellKnown(isKnown) {
 export function tellUndelivered({ count }) {
   $('undelivered').hidden = count === 0;
   if (count === 0) return;
+  stopSaving();
   $('saved').dataset.state = 'unsent';
   const [answers, were, are] = count === 1 ? ['1 answer', 'It was', 'It is'] : [`${count} answers`, 'They were', 'They are'];
   setText('saved', `not sent: ${answers} kept here`);

@@ -1,11 +1,12 @@
 //! Results of experiments, as pages show them: those below the data folder, which may still grow,
 //! and those that come with the program.
 //!
-//! Invariants: reads only; a report is made once for the same rows.
+//! Invariants: reads only, and of a name that is asked for nothing but its own folder; a report is
+//! kept until there are other rows.
 
 use std::collections::BTreeMap;
-use std::path::Path;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::path::{Component, Path};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use lab::experiment::Artifact;
 use lab::experiment::grid::{GridText, resolve, setting_names};
@@ -14,7 +15,11 @@ use lab::experiment::results::{GridFolder, Results, read_rows};
 use serde::Deserialize;
 
 /// `(name, experiment.toml, results.jsonl)`
-const SHIPPED: &[(&str, &str, &str)] = include!(concat!(env!("OUT_DIR"), "/results.rs"));
+type Shipped = (&'static str, &'static str, &'static str);
+
+const SHIPPED: &[Shipped] = include!(concat!(env!("OUT_DIR"), "/results.rs"));
+
+static REPORTS: Reports = Reports(Mutex::new(BTreeMap::new()));
 
 /// An experiment with its rows.
 #[derive(Debug, Clone)]
@@ -74,21 +79,39 @@ pub fn all(data: &Path) -> Vec<Experiment> {
         .collect();
     names.sort();
     let own = names.iter().map(|name| open(data, name));
-    let shipped = SHIPPED
-        .iter()
-        .filter(|(name, _, _)| !names.iter().any(|own| own == name))
-        .map(|(name, grid, rows)| Experiment {
-            is_shipped: true,
-            ..described(name, grid, Ok((*rows).to_owned()), None)
-        });
-    own.chain(shipped).collect()
+    let is_own = |name: &str| names.iter().any(|own| own == name);
+    let others = SHIPPED.iter().filter(|(name, _, _)| !is_own(name));
+    own.chain(others.map(shipped)).collect()
 }
 
-/// The experiment of that name.
+/// The experiment of that name; `None` also for what is no name of a folder but a path.
 pub fn find(data: &Path, name: &str) -> Option<Experiment> {
-    all(data)
-        .into_iter()
-        .find(|experiment| experiment.name == name)
+    if !is_name(name) {
+        return None;
+    }
+    if data.join("experiments").join(name).is_dir() {
+        return Some(open(data, name));
+    }
+    SHIPPED
+        .iter()
+        .find(|(known, _, _)| *known == name)
+        .map(shipped)
+}
+
+/// Whether it names something within a folder: not the folder above it, nor anything below.
+fn is_name(name: &str) -> bool {
+    let mut parts = Path::new(name).components();
+    matches!(
+        (parts.next(), parts.next()),
+        (Some(Component::Normal(part)), None) if part == name
+    )
+}
+
+fn shipped((name, grid, rows): &Shipped) -> Experiment {
+    Experiment {
+        is_shipped: true,
+        ..described(name, grid, Ok((*rows).to_owned()), None)
+    }
 }
 
 fn open(data: &Path, name: &str) -> Experiment {
@@ -103,7 +126,11 @@ fn open(data: &Path, name: &str) -> Experiment {
         is_up: is_held(&root),
         ..progress
     });
-    described(name, &text("experiment.toml"), rows, progress)
+    let mut experiment = described(name, &text("experiment.toml"), rows, progress);
+    if GridFolder::at(&root).is_small() {
+        experiment.title += " (small variant)";
+    }
+    experiment
 }
 
 /// Whether a start of the experiment, or a run of it, is up.
@@ -153,31 +180,55 @@ impl Experiment {
     /// # Errors
     /// What is wrong with the rows, for the person who looks at them.
     pub fn report(&self) -> Result<Arc<Vec<Artifact>>, String> {
-        type Made = (String, Arc<Vec<Artifact>>);
-        static MADE: Mutex<BTreeMap<String, Made>> = Mutex::new(BTreeMap::new());
-        if self
-            .results
-            .as_ref()
-            .map_err(String::clone)?
-            .runs
-            .is_empty()
-        {
+        let results = self.results.as_ref().map_err(String::clone)?;
+        if results.runs.is_empty() {
             return Ok(Arc::default());
         }
-        let mut made = MADE.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((rows, report)) = made.get(&self.name)
-            && *rows == self.rows
-        {
-            return Ok(Arc::clone(report));
+        REPORTS.get(&self.name, &self.rows, || {
+            let file = RowFile {
+                name: rows_of(&self.name),
+                text: self.rows.clone(),
+                settings: self.settings.clone(),
+            };
+            report::make(&[file], true).map_err(|error| error.to_string())
+        })
+    }
+}
+
+/// Rows and the report of them.
+type Made = (String, Arc<Vec<Artifact>>);
+
+/// The latest report of each experiment.
+struct Reports(Mutex<BTreeMap<String, Made>>);
+
+impl Reports {
+    /// The report of an experiment's rows, made where it is not there.
+    ///
+    /// Nobody waits while one is made: reports of other experiments can be had meanwhile. Two who ask
+    /// for the same new rows at once both make it, which is seldom and comes to the same bytes.
+    fn get(
+        &self,
+        name: &str,
+        rows: &str,
+        make: impl FnOnce() -> Result<Vec<Artifact>, String>,
+    ) -> Result<Arc<Vec<Artifact>>, String> {
+        if let Some(report) = self.kept(name, rows) {
+            return Ok(report);
         }
-        let file = RowFile {
-            name: rows_of(&self.name),
-            text: self.rows.clone(),
-            settings: self.settings.clone(),
-        };
-        let report = Arc::new(report::make(&[file], true).map_err(|error| error.to_string())?);
-        made.insert(self.name.clone(), (self.rows.clone(), Arc::clone(&report)));
+        let report = Arc::new(make()?);
+        let made = (rows.to_owned(), Arc::clone(&report));
+        self.lock().insert(name.to_owned(), made);
         Ok(report)
+    }
+
+    fn kept(&self, name: &str, rows: &str) -> Option<Arc<Vec<Artifact>>> {
+        let reports = self.lock();
+        let (of, report) = reports.get(name)?;
+        (of == rows).then(|| Arc::clone(report))
+    }
+
+    fn lock(&self) -> MutexGuard<'_, BTreeMap<String, Made>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -195,6 +246,87 @@ mod tests {
                 .unwrap_or_else(|error| panic!("{name}: {error}"));
             assert!(!report.is_empty(), "{name}");
         }
+    }
+
+    #[test]
+    fn what_comes_with_the_program_is_named_by_its_whole_path() {
+        let names: Vec<&str> = SHIPPED.iter().map(|(name, _, _)| *name).collect();
+        assert!(names.is_sorted_by(|a, b| a < b), "each once: {names:?}");
+        for name in ["80-answers", "query-rules"] {
+            let whole = format!("go-fetch-return-world-axes-{name}");
+            assert!(names.contains(&whole.as_str()), "{whole}");
+            assert!(!names.contains(&name), "{name}");
+        }
+    }
+
+    #[test]
+    fn a_folder_of_ones_own_stands_for_what_comes_with_the_program() {
+        let data = tempfile::tempdir().unwrap();
+        let name = SHIPPED[0].0;
+        assert!(find(data.path(), name).unwrap().is_shipped);
+        std::fs::create_dir_all(data.path().join("experiments").join(name)).unwrap();
+        assert!(!find(data.path(), name).unwrap().is_shipped);
+        let all = all(data.path());
+        let of_name = all.iter().filter(|experiment| experiment.name == name);
+        assert_eq!(of_name.count(), 1);
+    }
+
+    #[test]
+    fn only_folders_of_experiments_can_be_asked_for() {
+        let data = tempfile::tempdir().unwrap();
+        let folder = data.path().join("experiments/mine");
+        std::fs::create_dir_all(folder.join("runs")).unwrap();
+        std::fs::create_dir_all(data.path().join("else")).unwrap();
+        assert!(find(data.path(), "mine").is_some());
+        let outside = data.path().join("else").display().to_string();
+        for name in [
+            "",
+            ".",
+            "..",
+            "./mine",
+            "mine/",
+            "mine/runs",
+            "../else",
+            outside.as_str(),
+        ] {
+            assert!(find(data.path(), name).is_none(), "{name}");
+        }
+    }
+
+    #[test]
+    fn a_small_variant_says_so() {
+        let data = tempfile::tempdir().unwrap();
+        let root = data.path().join("experiments/labels");
+        std::fs::create_dir_all(&root).unwrap();
+        let title = || find(data.path(), "labels").unwrap().title;
+        let grid =
+            "title = \"Labels\"\n[axes]\ntasks = [\"go-fetch-return\"]\nmethods = [\"stair\"]\n";
+        std::fs::write(root.join("experiment.toml"), grid).unwrap();
+        assert_eq!(title(), "Labels", "as an earlier revision left it");
+        GridFolder::at(&root).keep_file(grid, true).unwrap();
+        assert_eq!(title(), "Labels (small variant)");
+        GridFolder::at(&root).keep_file(grid, false).unwrap();
+        assert_eq!(title(), "Labels");
+    }
+
+    #[test]
+    fn nobody_waits_while_a_report_is_made_and_it_is_made_once() {
+        let reports = Reports(Mutex::default());
+        let made = || {
+            vec![Artifact {
+                name: "report.md".into(),
+                text: "made".into(),
+            }]
+        };
+        let first = reports.get("mine", "rows", || {
+            assert!(reports.0.try_lock().is_ok(), "others can be had meanwhile");
+            Ok(made())
+        });
+        assert_eq!(*first.unwrap(), made());
+        let again = reports.get("mine", "rows", || Err("made again".into()));
+        assert_eq!(*again.unwrap(), made());
+        let of_new_rows = reports.get("mine", "more rows", || Err("made again".into()));
+        assert_eq!(of_new_rows.unwrap_err(), "made again");
     }
 
     #[test]

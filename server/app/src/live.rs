@@ -25,7 +25,7 @@ mod state_line;
 mod study;
 
 use clip_worker::ClipQueue;
-pub use driver::HUMAN;
+pub use driver::{DAMAGED_CHECKPOINT, DAMAGED_HISTORY, HTTP, HUMAN};
 pub use state_line::{StateKind, StateLine};
 pub use study::parse as parse_study;
 
@@ -257,8 +257,8 @@ impl Live {
         self.0.events.subscribe()
     }
 
-    /// Why clips cannot be drawn on this machine, with what to do about it.
-    pub fn clip_trouble(&self) -> Option<&str> {
+    /// Why no clips come at the moment, with what to do about it.
+    pub fn clip_trouble(&self) -> Option<String> {
         self.0.clips.trouble()
     }
 

@@ -41,20 +41,6 @@ fn time_of_day(at: &str) -> &str {
     at.get(11..19).unwrap_or_default()
 }
 
-/// 12345 → `12,345`.
-fn thousands(n: u64) -> String {
-    let digits = n.to_string();
-    let first = digits.len() % 3;
-    let mut text = digits[..first].to_owned();
-    for start in (first..digits.len()).step_by(3) {
-        if !text.is_empty() {
-            text.push(',');
-        }
-        text.push_str(&digits[start..start + 3]);
-    }
-    text
-}
-
 /// A share as people read it: `35 %`.
 fn percent(share: f64) -> String {
     format!("{:.0} %", 100.0 * share)
@@ -63,12 +49,6 @@ fn percent(share: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn large_numbers_are_grouped_by_threes() {
-        let words = [0, 999, 1_000, 123_456, 1_234_567].map(thousands).join(" ");
-        assert_eq!(words, "0 999 1,000 123,456 1,234,567");
-    }
 
     #[test]
     fn a_share_is_told_in_whole_percent() {

@@ -187,6 +187,28 @@ impl Problem {
         )
     }
 
+    /// 403: a teacher token is for the researcher to make.
+    pub fn researchers_only() -> Self {
+        let detail = "A teacher token is made by the researcher: send the server's token, without a labeler's cookie.";
+        Self::new(
+            StatusCode::FORBIDDEN,
+            "/problems/researchers-only",
+            "Not for labelers or teachers",
+            detail,
+        )
+    }
+
+    /// 410: the bytes of a known clip are gone; asking again does not bring them back.
+    pub fn clip_gone() -> Self {
+        let detail = "The file of this clip is gone from the server's data folder. Pass the pair over as a broken clip; whoever runs the server can put the file back from a copy of the folder.";
+        Self::new(
+            StatusCode::GONE,
+            "/problems/clip-gone",
+            "This clip is gone",
+            detail,
+        )
+    }
+
     /// 403: a teacher token is for less than this.
     pub fn beyond_teaching() -> Self {
         let detail = "A teacher token is for answering its own run's queries: the run, its leases and answers, the queries' task rewards, and clips. Everything else needs the server's token.";

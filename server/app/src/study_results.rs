@@ -10,7 +10,7 @@ use domain::agreement::{
     cohens_kappa, newcombe, self_consistency,
 };
 use lab::figure::{self, FigureError, Request, Source};
-use lab::method::METHODS;
+use lab::method::rank;
 use serde_json::json;
 use store::{Label, LabelsOf, Store, StoreError, StudyId};
 
@@ -201,12 +201,6 @@ fn compared(counted: &[&Label]) -> Option<[String; 2]> {
     let mut methods = names(counted.iter().filter_map(|label| label.method.as_ref()));
     methods.sort_by_key(|method| rank(method));
     methods.try_into().ok()
-}
-
-/// Place of a method in the program's list.
-fn rank(method: &str) -> usize {
-    let known = METHODS.iter().position(|known| known.name == method);
-    known.unwrap_or(METHODS.len())
 }
 
 fn with_role<'l>(labels: &[&'l Label], role: &'static str) -> impl Iterator<Item = &'l Label> {

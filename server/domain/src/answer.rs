@@ -2,16 +2,6 @@
 
 use serde::{Deserialize, Serialize};
 
-/// One of the two places on the page.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Side {
-    /// The left clip.
-    Left,
-    /// The right clip.
-    Right,
-}
-
 /// One of a query's two segments.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -23,15 +13,6 @@ pub enum Which {
 }
 
 impl Which {
-    /// The segment shown on `side` when `self` is shown on the left.
-    #[must_use]
-    pub fn shown_on(self, side: Side) -> Self {
-        match side {
-            Side::Left => self,
-            Side::Right => self.other(),
-        }
-    }
-
     /// The other one.
     #[must_use]
     pub fn other(self) -> Self {
@@ -54,18 +35,6 @@ pub enum Answer {
     Equal,
     /// No judgement: a bad clip, or it cannot be told. Uses no budget, unless a run is told so.
     Skip,
-}
-
-impl Answer {
-    /// What a learner may see. Skips carry no information, so they never become a preference.
-    pub fn preference(self, shown_left: Which) -> Option<Preference> {
-        match self {
-            Self::Left => Some(Preference::Prefer(shown_left)),
-            Self::Right => Some(Preference::Prefer(shown_left.other())),
-            Self::Equal => Some(Preference::Equal),
-            Self::Skip => None,
-        }
-    }
 }
 
 /// What a labeler may say to "same stage?".
@@ -107,27 +76,5 @@ impl Preference {
             Self::Prefer(Which::Second) => 1.0,
             Self::Equal => 0.5,
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn sides_swapped_the_meaning_stays() {
-        assert_eq!(
-            Answer::Left.preference(Which::First),
-            Answer::Right.preference(Which::Second)
-        );
-        assert_eq!(
-            Answer::Equal.preference(Which::First),
-            Some(Preference::Equal)
-        );
-    }
-
-    #[test]
-    fn a_skip_never_becomes_a_preference() {
-        assert_eq!(Answer::Skip.preference(Which::First), None);
     }
 }

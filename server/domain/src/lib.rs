@@ -7,6 +7,7 @@ pub mod agreement;
 pub mod answer;
 pub mod environment;
 pub mod episode;
+pub mod nearest;
 pub mod query;
 pub mod random;
 pub mod sampler;

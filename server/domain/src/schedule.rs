@@ -63,11 +63,6 @@ impl FeedbackSchedule {
         self.first_step + u64::from(index) * self.every
     }
 
-    /// Whether session `index` is due at `step`, with `n_answers` of the budget spent.
-    pub fn is_due(&self, index: u32, step: u64, n_answers: u32) -> bool {
-        n_answers < self.budget && step >= self.step_of(index)
-    }
-
     /// Queries of session `index` in a run of `total_steps`, whatever is left of the budget: M in
     /// the first, later at least one, and at most the whole budget.
     ///
@@ -130,8 +125,8 @@ mod tests {
             ..FeedbackSchedule::default()
         };
         assert_eq!(schedule.session_size(2, 1_000_000, 100), 20);
-        assert!(schedule.is_due(2, 20_000, 100));
-        assert!(!schedule.is_due(3, 25_000, 120));
+        assert_eq!(schedule.session_size(3, 1_000_000, 120), 0);
+        assert_eq!((schedule.step_of(2), schedule.step_of(3)), (20_000, 25_000));
     }
 
     /// M = 80, first after 4,000 of 160,000 steps, then every 6,000.

@@ -4,15 +4,14 @@
 
 use serde::{Deserialize, Serialize};
 
+use domain::nearest::nearest;
 use domain::sampler::{SamplerSettings, StageCoefficients};
 use domain::schedule::FeedbackSchedule;
-use domain::teacher::TeacherSettings;
+use domain::teacher::{Judge, SCRIPTED, TeacherSettings, judge};
 use learn::exploration::{BonusConfig, ExplorationConfig};
 use learn::reward::{DenoisingConfig, RewardConfig, SemiSupervisedConfig, SteeringConfig};
 use learn::sac::SacConfig;
 use learn::temporal::TemporalConfig;
-
-use crate::nearest::nearest;
 
 mod check;
 mod command;
@@ -205,8 +204,9 @@ pub struct QueriesConfig {
     pub same_stage_fraction: f64,
     /// Whether indistinguishable answers train towards (½, ½) or are dropped.
     pub train_on_equal: bool,
-    /// Share of a session's answers after which the run goes on, (0, 1]; later answers are
-    /// trained on with the next session.
+    /// Share of a session's answers after which the run goes on, (0, 1]. Later answers are
+    /// trained on with the next session; where none is to come, by themselves, as soon as the same
+    /// share of those that are still missing is there.
     pub sufficient_fraction: f64,
 }
 
@@ -266,7 +266,7 @@ pub enum ConfigError {
     /// A name that no registry holds.
     #[error("there is no {what} '{name}'{}; known: {known}", hint(.nearest.as_ref()))]
     UnknownName {
-        /// `task`, `method`, `preset`.
+        /// `task`, `method`, `preset`, `teacher`.
         what: &'static str,
         /// What was asked for.
         name: String,
@@ -371,6 +371,35 @@ impl RunConfig {
 pub fn find_task(name: &str) -> Result<&'static sim::tasks::Task, ConfigError> {
     sim::tasks::task(name)
         .map_err(|_| unknown("task", name, sim::tasks::tasks().iter().map(|t| t.name)))
+}
+
+/// Whether a scripted teacher has this name, or one of `others` who answer from outside a run.
+///
+/// # Errors
+/// Names the nearest right one.
+pub fn find_teacher(name: &str, others: &[&str]) -> Result<(), ConfigError> {
+    let is_scripted = SCRIPTED.iter().any(|(known, _)| *known == name);
+    if is_scripted || others.contains(&name) {
+        return Ok(());
+    }
+    Err(unknown_teacher(name, others))
+}
+
+/// The scripted teacher of that name, with its part of the settings.
+///
+/// # Errors
+/// Names the nearest right one.
+pub fn scripted_teacher(
+    name: &str,
+    seed: u64,
+    settings: &TeacherSettings,
+) -> Result<Box<dyn Judge>, ConfigError> {
+    judge(name, seed, settings).ok_or_else(|| unknown_teacher(name, &[]))
+}
+
+fn unknown_teacher(name: &str, others: &[&str]) -> ConfigError {
+    let scripted = SCRIPTED.iter().map(|(name, _)| *name);
+    unknown("teacher", name, others.iter().copied().chain(scripted))
 }
 
 /// An error that names the nearest known name.

@@ -8,6 +8,7 @@ use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
 use learn::checkpoint::Archive;
+use learn::durable;
 
 use crate::message::Event;
 use crate::run::RunError;
@@ -266,13 +267,7 @@ fn first_entry(folder: &Path, is: &dyn Fn(&str) -> bool) -> Result<Option<String
 
 /// Writes a file so that a kill leaves the old or the new one.
 pub(crate) fn write_durably(path: &Path, bytes: &[u8]) -> Result<(), RunError> {
-    let draft = path.with_extension("draft");
-    let written = File::create(&draft).and_then(|mut file| {
-        file.write_all(bytes)?;
-        file.sync_all()?;
-        fs::rename(&draft, path)
-    });
-    written.map_err(io_error("save", path))
+    durable::replace(path, bytes).map_err(io_error("save", path))
 }
 
 /// Says what was tried, and where.

@@ -12,13 +12,13 @@ pub mod history;
 pub mod memory;
 pub mod message;
 pub mod method;
-pub mod nearest;
 pub mod policy;
 pub mod record;
 pub mod run;
 pub mod stepping;
 pub mod study;
 pub mod temporal_map;
+pub mod words;
 
 mod candidates;
 mod folder;

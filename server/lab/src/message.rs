@@ -27,6 +27,9 @@ pub enum Event {
     SessionOffered(SessionOffered),
     /// A session is complete; the reward was fitted and the replay relabelled.
     SessionClosed(SessionClosed),
+    /// Answers came when no session was to come any more; the reward was fitted once more and the
+    /// replay relabelled.
+    Refitted(Refitted),
     /// The policy was tried on held-out episodes.
     Evaluation(Evaluation),
     /// One episode of the present policy to look at: "how it does now".
@@ -117,14 +120,17 @@ pub struct SessionOffered {
     pub stage_gap_chosen: Option<f64>,
     /// Mean stage gap of all candidates, in the same unit.
     pub stage_gap_pool: Option<f64>,
-    /// Share of chosen queries whose four end states are in one true stage.
+    /// Share of chosen queries whose four end states, those after a segment's first and last step,
+    /// are in one true stage.
     pub same_stage_chosen: Option<f64>,
     /// The same share of all candidates. `None` where the task does not know its stages, and in rows
     /// of before it stood in them.
     #[serde(default)]
     pub same_stage_pool: Option<f64>,
     /// Probability that of two candidates, one within a true stage and one not, the former has the
-    /// smaller stage gap, ties half: 1 where the gap tells them apart, ½ where it says nothing.
+    /// smaller stage gap, ties half: 1 where the gap tells them apart, ½ where it says nothing. A
+    /// learned gap is of the states before a segment's first and last step (Eq. 8), a true stage of
+    /// those after them, so a pair with a change of stage just there counts as the stages say.
     /// `None` without stages or gaps, where all candidates are of one kind, and in rows of before it
     /// stood in them.
     #[serde(default)]
@@ -161,6 +167,25 @@ pub struct SessionClosed {
     /// near people are to the task reward. `None` where no pair was left.
     #[serde(default)]
     pub oracle_agreement: Option<f64>,
+}
+
+/// What answers did to the reward that came after the last session was over.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Refitted {
+    /// Environment steps taken.
+    pub step: u64,
+    /// Answers in all, skips not counted.
+    pub labels: u32,
+    /// Those that the fit before had not seen.
+    pub n_late: u32,
+    /// Number of the fit in its run, from 1, those after sessions among them.
+    pub fit: u32,
+    /// Epochs of the fit.
+    pub epochs: u32,
+    /// Mean cross-entropy of the last epoch.
+    pub loss: f64,
+    /// Mean share of answers that the members agree with, last epoch.
+    pub accuracy: f64,
 }
 
 /// The policy on held-out episodes, mean action.

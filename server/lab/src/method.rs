@@ -159,6 +159,12 @@ pub fn build(config: &RunConfig) -> Result<Method, ConfigError> {
     Ok(method.choosing_with(sampler, config))
 }
 
+/// Place of a method in the program's list; those that are not in it come last.
+pub fn rank(name: &str) -> usize {
+    let known = METHODS.iter().position(|method| method.name == name);
+    known.unwrap_or(METHODS.len())
+}
+
 /// The method of that name.
 ///
 /// # Errors

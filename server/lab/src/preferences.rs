@@ -93,6 +93,11 @@ impl Preferences {
         self.count(|state| state == AnswerState::Skipped)
     }
 
+    /// Queries that nobody has answered yet, those of sessions that are over among them.
+    pub(crate) fn n_open(&self) -> u32 {
+        self.count(|state| state == AnswerState::Open)
+    }
+
     fn count(&self, is: impl Fn(AnswerState) -> bool) -> u32 {
         self.0.values().filter(|asked| is(asked.state)).count() as u32
     }

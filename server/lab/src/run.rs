@@ -12,7 +12,7 @@ use domain::schedule::Every;
 use domain::teacher::{Answered, Teacher};
 use learn::beliefs::LearnedBeliefs;
 use learn::replay::{BatchRule, Replay, ReplayMark};
-use learn::reward::{Estimate, Labeled, SteeringConfig};
+use learn::reward::{Estimate, Labeled, RewardFit, SteeringConfig};
 use serde::{Deserialize, Serialize};
 
 use crate::candidates::Pool;
@@ -20,7 +20,7 @@ use crate::config::{RunConfig, WhileWaiting};
 use crate::folder::RunFolder;
 use crate::lanes::Lanes;
 use crate::learner::{Due, Learner};
-use crate::message::{Activity, Command, Event, Finished, SessionClosed};
+use crate::message::{Activity, Command, Event, Finished, Refitted, SessionClosed};
 use crate::meter::Meter;
 use crate::method::Method;
 use crate::preferences::{AnswerState, Preferences};
@@ -68,6 +68,12 @@ pub(crate) struct Progress {
     pub(crate) step: u64,
     n_sessions: u32,
     n_fits: u32,
+    /// Step at which the last session was asked.
+    #[serde(default)]
+    asked_at: Option<u64>,
+    /// Answers to queries of sessions that are over, since the last fit.
+    #[serde(default)]
+    n_late: u32,
     consumed_sequence: u64,
     last_evaluation: Option<(f64, f64)>,
     /// Step of the last evaluation.
@@ -129,6 +135,8 @@ impl Run {
             self.take_answers(teacher)?;
             if self.session_is_complete() {
                 self.learn_from_session(events)?;
+            } else if self.late_answers_suffice() {
+                self.learn_from_late_answers(events)?;
             } else if self.stands_still() {
                 self.say_activity(events);
                 self.meter.rest(REST);
@@ -186,6 +194,7 @@ impl Run {
                 .as_mut()
                 .filter(|s| s.index() == answered.key.session)
             else {
+                self.progress.n_late += u32::from(!is_new_skip);
                 continue;
             };
             let is_replaced = is_new_skip && !self.config.queries.bpref_skips;
@@ -211,11 +220,27 @@ impl Run {
     }
 
     fn asks_now(&self) -> bool {
-        let (session, step) = (self.progress.n_sessions, self.progress.step);
-        self.method.sampler.is_some()
-            && self.session.is_none()
-            && self.config.feedback.is_due(session, step, self.n_spent())
+        self.session.is_none()
+            && self
+                .next_session_at()
+                .is_some_and(|due| self.progress.step >= due)
             && self.pool().holds_a_pair(&self.replay)
+    }
+
+    /// Environment step at which the next session is due; `None` where there is none to come. Where
+    /// the run goes on while it waits, a session that was asked late moves those after it: between
+    /// any two lie as many steps as are to.
+    fn next_session_at(&self) -> Option<u64> {
+        let feedback = &self.config.feedback;
+        let planned = feedback.step_of(self.progress.n_sessions);
+        let due = match (self.config.training.while_waiting, self.progress.asked_at) {
+            (WhileWaiting::Train, Some(asked_at)) => planned.max(asked_at + feedback.every),
+            _ => planned,
+        };
+        let is_to_come = self.method.sampler.is_some()
+            && self.n_committed() < feedback.budget
+            && due < self.config.training.total_steps;
+        is_to_come.then_some(due)
     }
 
     /// Chooses a session's queries, makes them durable, and asks.
@@ -229,7 +254,7 @@ impl Run {
         let size = self.config.feedback.session_size(
             index,
             self.config.training.total_steps,
-            self.n_spent(),
+            self.n_committed(),
         );
         let queries = &self.config.queries;
         let mut rng = Rng::new(self.config.seed, Stream::Candidates, u64::from(index));
@@ -262,6 +287,7 @@ impl Run {
         }
         self.session = Some(session);
         self.progress.n_sessions += 1;
+        self.progress.asked_at = Some(self.progress.step);
         self.say(Event::SessionOffered(report), events)?;
         self.checkpoint_and_say(events)?;
         self.offer_open_queries(teacher)
@@ -280,25 +306,25 @@ impl Run {
         }
     }
 
-    /// Pairs that nobody is asked about, for methods that learn from them too.
-    fn unlabeled(&self, session: u32) -> Vec<Query> {
+    /// Pairs that nobody is asked about, for methods that learn from them too: as many as belong to
+    /// a session.
+    ///
+    /// * `draw` – number of the draw, for random numbers of its own
+    fn unlabeled(&self, session: u32, draw: u64) -> Vec<Query> {
         let per_query = self.learner.unlabeled_per_query() as usize;
         let n = per_query * self.full_size(session) as usize;
-        let mut rng = Rng::new(self.config.seed, Stream::Unlabeled, u64::from(session));
+        let mut rng = Rng::new(self.config.seed, Stream::Unlabeled, draw);
         self.pool().draw(&self.replay, n, &mut rng)
     }
 
-    /// Fits the reward to all answers and relabels the replay.
+    /// Fits the reward to the answers of a session, and all before, and relabels the replay.
     fn learn_from_session(&mut self, events: &mut dyn FnMut(Event)) -> Result<(), RunError> {
         let Some(session) = self.session.take() else {
             return Ok(());
         };
-        let labeled = self.preferences.labeled(self.config.queries.train_on_equal);
         let is_first = self.progress.n_fits == 0;
-        self.progress.n_fits += 1;
-        let unlabeled = self.unlabeled(session.index());
-        let fit = self.learner.fit_reward(&self.replay, &labeled, &unlabeled);
-        self.learner.reward.relabel(&mut self.replay);
+        let index = session.index();
+        let fit = self.fit(&self.unlabeled(index, u64::from(index)));
         if is_first {
             self.end_exploration();
         }
@@ -312,6 +338,46 @@ impl Run {
             oracle_agreement: session.oracle_agreement(&self.preferences, &self.replay),
         };
         self.say(Event::SessionClosed(closed), events)
+    }
+
+    /// Whether answers that came after their session was over are to be learned from by themselves:
+    /// no session is to come that takes them with it, and of those that may still come as large a
+    /// share is there as lets a session go on.
+    fn late_answers_suffice(&self) -> bool {
+        let n_late = f64::from(self.progress.n_late);
+        let n_open = f64::from(self.preferences.n_open());
+        self.progress.n_late > 0
+            && self.session.is_none()
+            && self.next_session_at().is_none()
+            && n_late >= (n_late + n_open) * self.config.queries.sufficient_fraction
+    }
+
+    /// The same as after a session, of answers that came too late for the last one.
+    fn learn_from_late_answers(&mut self, events: &mut dyn FnMut(Event)) -> Result<(), RunError> {
+        let n_late = self.progress.n_late;
+        let last = self.progress.n_sessions.saturating_sub(1);
+        let draw = (1 << 32) + u64::from(self.progress.n_fits); // beyond those of sessions
+        let fit = self.fit(&self.unlabeled(last, draw));
+        let refitted = Refitted {
+            step: self.progress.step,
+            labels: self.preferences.n_preferred(),
+            n_late,
+            fit: self.progress.n_fits,
+            epochs: fit.n_epochs,
+            loss: f64::from(fit.loss),
+            accuracy: f64::from(fit.accuracy),
+        };
+        self.say(Event::Refitted(refitted), events)
+    }
+
+    /// Fits the reward to all answers that are there and relabels the replay.
+    fn fit(&mut self, unlabeled: &[Query]) -> RewardFit {
+        let labeled = self.preferences.labeled(self.config.queries.train_on_equal);
+        self.progress.n_fits += 1;
+        self.progress.n_late = 0;
+        let fit = self.learner.fit_reward(&self.replay, &labeled, unlabeled);
+        self.learner.reward.relabel(&mut self.replay);
+        fit
     }
 
     /// One control step in every environment, and the updates that are due beside it.
@@ -435,6 +501,12 @@ impl Run {
 
     fn has_budget(&self) -> bool {
         self.n_spent() < self.config.feedback.budget
+    }
+
+    /// Of the budget, with queries that may still be answered: what was not answered of a session
+    /// that went on with fewer can be answered later.
+    fn n_committed(&self) -> u32 {
+        self.n_spent() + self.preferences.n_open()
     }
 
     /// Of the budget.

@@ -4,6 +4,7 @@
     reason = "a story that cannot go on fails where it stands"
 )]
 
+mod late;
 mod methods;
 mod query_sets;
 mod taken_up;

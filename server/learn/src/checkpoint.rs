@@ -1,14 +1,13 @@
 //! Named sections in one file: written whole or not at all, and refused when damaged.
 
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::Write;
 use std::path::Path;
 
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use crate::checksum::Checksum;
+use crate::durable;
 use crate::error::LearnError;
 
 const MAGIC: &[u8; 8] = b"STAIRckp";
@@ -145,7 +144,7 @@ impl Archive {
     /// # Errors
     /// When the folder cannot be written (full, read-only).
     pub fn write(&self, path: &Path) -> Result<(), LearnError> {
-        write_durably(path, &self.to_bytes())
+        durable::replace(path, &self.to_bytes()).map_err(|e| LearnError::file("write", path, e))
     }
 
     /// Reads a file that [`Archive::write`] wrote.
@@ -266,25 +265,6 @@ impl Section {
 pub(crate) fn numbers<T, const N: usize>(bytes: &[u8], number: fn([u8; N]) -> T) -> Vec<T> {
     let parse = |chunk: &[u8]| number(chunk.try_into().expect("chunks of a number's size"));
     bytes.chunks_exact(N).map(parse).collect()
-}
-
-/// Writes beside the place, fsyncs, renames, and fsyncs the folder.
-pub(crate) fn write_durably(path: &Path, bytes: &[u8]) -> Result<(), LearnError> {
-    let beside = path.with_extension("partial");
-    let write = || -> std::io::Result<()> {
-        let mut file = File::create(&beside)?;
-        file.write_all(bytes)?;
-        file.sync_all()?;
-        std::fs::rename(&beside, path)?;
-        match path
-            .parent()
-            .filter(|folder| !folder.as_os_str().is_empty())
-        {
-            Some(folder) => File::open(folder)?.sync_all(),
-            None => Ok(()),
-        }
-    };
-    write().map_err(|e| LearnError::file("write", path, e))
 }
 
 #[cfg(test)]

@@ -15,6 +15,7 @@ pub mod beliefs;
 pub mod checkpoint;
 pub mod checksum;
 pub mod device;
+pub mod durable;
 pub mod exploration;
 pub mod replay;
 pub mod reward;

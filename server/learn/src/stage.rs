@@ -22,7 +22,10 @@ pub enum StageApproximator {
     /// A state's stage is its step in its episode; segments are intervals of steps.
     Timestep,
     /// A state's stage is what the task itself says, and a distance how many stages apart two
-    /// states are: Eq. 8 without anything learned, so 0 within a true stage alone.
+    /// states are: Eq. 8 without anything learned, so 0 within a true stage alone. Its ends are the
+    /// states after a segment's first and last step, which a clip shows and by which people and
+    /// [`is_same_stage`](domain::query::is_same_stage) judge; the learned distance's are those
+    /// before these steps.
     True,
 }
 

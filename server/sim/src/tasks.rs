@@ -1,6 +1,7 @@
 //! The list of tasks: one line here and one file beside it make a task.
 
 use domain::environment::{EnvSpec, Environment};
+use domain::nearest::nearest;
 use domain::scene::{Frame, Scene};
 
 pub mod assembly;
@@ -82,42 +83,31 @@ pub fn task(name: &str) -> Result<&'static Task, UnknownTask> {
 
 /// A name that no task has.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("there is no task {name:?}; did you mean {nearest:?}? The tasks are: {known}")]
+#[error("there is no task {name:?}{}; the tasks are: {known}", hint(.nearest.as_ref()))]
 pub struct UnknownTask {
     /// What was asked for.
     pub name: String,
-    /// The task whose name takes the fewest changed letters.
-    pub nearest: &'static str,
+    /// The task that was probably meant; `None` where no name is like it.
+    pub nearest: Option<&'static str>,
     /// All names, with commas between them.
     pub known: String,
 }
 
 impl UnknownTask {
     fn new(name: &str) -> Self {
-        let names = || tasks().iter().map(|task| task.name);
+        let names: Vec<&'static str> = tasks().iter().map(|task| task.name).collect();
         Self {
             name: name.into(),
-            nearest: names()
-                .min_by_key(|known| edit_distance(name, known))
-                .expect("the list of tasks is not empty"),
-            known: names().collect::<Vec<_>>().join(", "),
+            nearest: nearest(name, &names),
+            known: names.join(", "),
         }
     }
 }
 
-/// Letters to insert, delete or change to get from `a` to `b` (Levenshtein).
-fn edit_distance(a: &str, b: &str) -> usize {
-    let mut row: Vec<usize> = (0..=b.chars().count()).collect();
-    for (i, from) in a.chars().enumerate() {
-        let mut diagonal = row[0];
-        row[0] = i + 1;
-        for (j, to) in b.chars().enumerate() {
-            let changed = diagonal + usize::from(from != to);
-            diagonal = row[j + 1];
-            row[j + 1] = changed.min(row[j] + 1).min(diagonal + 1);
-        }
-    }
-    row[row.len() - 1]
+fn hint(nearest: Option<&&str>) -> String {
+    nearest
+        .map(|name| format!(" (did you mean {name:?}?)"))
+        .unwrap_or_default()
 }
 
 #[cfg(test)]

@@ -59,7 +59,7 @@ impl Store {
         rows.iter().map(read).collect()
     }
 
-    /// The run's events of these kinds (comma-separated), oldest first.
+    /// The run's events of any of these kinds, oldest first.
     ///
     /// # Errors
     /// When the database cannot be read.

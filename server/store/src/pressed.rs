@@ -55,12 +55,39 @@ impl Pressed {
         }
     }
 
-    /// What the word means, whatever the sides: `first`, `second`, or the word itself.
+    /// What the word means, whatever the sides: `first`, `second`, or the word itself. A skip
+    /// carries no information, so it never means a segment.
     pub(crate) fn meaning(self, left_is: Which) -> &'static str {
         match self {
             Self::Preference(Answer::Left) => word(left_is),
             Self::Preference(Answer::Right) => word(left_is.other()),
             other => other.word(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sides_swapped_the_meaning_stays() {
+        let meaning = |answer, left_is| Pressed::Preference(answer).meaning(left_is);
+        for (pressed, opposite) in [(Answer::Left, Answer::Right), (Answer::Right, Answer::Left)] {
+            let of_first = meaning(pressed, Which::First);
+            assert_eq!(of_first, meaning(opposite, Which::Second));
+        }
+        assert_eq!(meaning(Answer::Left, Which::First), "first");
+        assert_eq!(meaning(Answer::Left, Which::Second), "second");
+    }
+
+    #[test]
+    fn a_word_that_prefers_no_segment_means_itself() {
+        for left_is in [Which::First, Which::Second] {
+            assert_eq!(Pressed::Preference(Answer::Equal).meaning(left_is), "equal");
+            assert_eq!(Pressed::Preference(Answer::Skip).meaning(left_is), "skip");
+            let same = Pressed::SameStage(StageJudgement::Same);
+            assert_eq!(same.meaning(left_is), "same");
         }
     }
 }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-use sqlx::migrate::MigrateError;
+use sqlx::migrate::{MigrateError, Migrator};
 use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePoolOptions, SqliteSynchronous};
 use sqlx::{ConnectOptions as _, Row as _, SqliteConnection, SqlitePool};
 use tokio::sync::watch;
@@ -19,6 +19,8 @@ use crate::writer::{Transaction, Working, Writer};
 /// Connections for reading; SQLite readers never wait for the writer.
 const READERS: u32 = 4;
 const BUSY_TIMEOUT: Duration = Duration::from_secs(5);
+/// What makes a database, and an older one this version's.
+static MIGRATIONS: Migrator = sqlx::migrate!("../../migrations");
 
 /// The data folder of one server. Cheap to clone.
 #[derive(Debug, Clone)]
@@ -169,7 +171,7 @@ fn lock(folder: &Path) -> Result<File, StoreError> {
 }
 
 async fn migrate(connection: &mut SqliteConnection, path: &Path) -> Result<(), StoreError> {
-    match sqlx::migrate!("../../migrations").run(connection).await {
+    match MIGRATIONS.run(connection).await {
         Ok(()) => Ok(()),
         Err(MigrateError::VersionMissing(version)) => Err(StoreError::Newer {
             path: path.to_owned(),
@@ -218,6 +220,8 @@ mod tests {
     use sqlx::{Connection as _, Executor as _, SqliteConnection};
 
     use super::*;
+    use crate::secret::Secret;
+    use crate::token::TokenKind;
 
     /// SQL from outside the program, as somebody with a database shell would send it.
     async fn execute(folder: &Path, sql: &'static str) -> Result<(), sqlx::Error> {
@@ -244,6 +248,75 @@ mod tests {
             matches!(refused, StoreError::Newer { version: 9999, .. }),
             "{refused}"
         );
+    }
+
+    /// A labeler and a run in a database of the version with migration 6, and two tokens: of that
+    /// run, and of one that is not there.
+    async fn filled_by_the_version_before(folder: &Path, run: &Secret, no_run: &Secret) {
+        let options = SqliteConnectOptions::new()
+            .filename(folder.join("stair.sqlite"))
+            .create_if_missing(true)
+            .foreign_keys(true);
+        let mut old = SqliteConnection::connect_with(&options)
+            .await
+            .expect("a database");
+        MIGRATIONS.run_to(6, &mut old).await.expect("that version");
+        let rows =
+            "insert into labeler (id, name, created_at_ms) values (2, 'program of run 1', 0);
+             insert into run (id, task, method, preset, seed, teacher, draws_clips, config, budget,
+                total_steps, state, state_message, state_next, state_since_ms, created_at_ms)
+             values (1, 'any', 'any', '', 1, 'http', 0, '', 1, 1, 'stopped', '', '', 0, 0);";
+        old.execute(rows).await.expect("rows");
+        for (secret, number) in [(run, 1), (no_run, 9)] {
+            sqlx::query("insert into token (hash, kind, labeler_id, run_id, created_at_ms) values (?, 'teacher', 2, ?, 0)")
+                .bind(secret.hash())
+                .bind(number)
+                .execute(&mut old)
+                .await
+                .expect("a token");
+        }
+        old.close().await.expect("closed");
+    }
+
+    #[tokio::test]
+    async fn a_token_of_the_version_before_is_kept_where_there_is_its_run() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let [run, no_run] = ["of a run", "of none"].map(Secret::brought);
+        filled_by_the_version_before(folder.path(), &run, &no_run).await;
+        let store = Store::open(folder.path())
+            .await
+            .expect("brought up to date");
+        let bearer = store.bearer(&run).await.expect("read");
+        assert_eq!(
+            bearer.map(|bearer| bearer.kind),
+            Some(TokenKind::Teacher(RunId(1)))
+        );
+        assert_eq!(store.bearer(&no_run).await.expect("read"), None);
+        let of_no_run = "insert into token (hash, kind, labeler_id, run_id, created_at_ms)
+                         values (zeroblob(32), 'teacher', 2, 9, 0)";
+        let refused = execute(folder.path(), of_no_run)
+            .await
+            .expect_err("no such run");
+        assert!(refused.to_string().contains("FOREIGN KEY"), "{refused}");
+    }
+
+    #[tokio::test]
+    async fn what_still_refers_to_a_row_is_found_without_reading_a_whole_table() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let store = Store::open(folder.path()).await.expect("a store");
+        for sql in [
+            "explain query plan delete from clip where sha256 = ''",
+            "explain query plan delete from question where id = 0",
+            "explain query plan delete from study_item where id = 0",
+        ] {
+            let rows = sqlx::query(sql).fetch_all(store.readers()).await;
+            let rows = rows.expect(sql);
+            let steps: Vec<String> = rows.iter().map(|row| row.get("detail")).collect();
+            assert!(
+                steps.iter().all(|step| step.starts_with("SEARCH")),
+                "{steps:?}"
+            );
+        }
     }
 
     #[tokio::test]

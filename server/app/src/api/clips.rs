@@ -2,7 +2,7 @@
 
 use axum::Json;
 use axum::extract::{Request, State};
-use axum::http::{HeaderValue, header};
+use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse as _, Response};
 use serde::Serialize;
 use store::AnsweredPair;
@@ -17,10 +17,13 @@ use crate::state::AppState;
 /// A clip by the SHA-256 of its bytes: it never changes, so it is kept for a year.
 ///
 /// # Errors
-/// An unknown clip.
+/// An unknown clip; a clip whose bytes are gone from the server's data folder, which asking again
+/// does not bring back.
 #[utoipa::path(get, path = "/api/v1/clips/{name}", tag = "clips",
     params(("name" = String, Path, description = "64 hexadecimal digits and .mp4")),
-    responses((status = 200, content_type = "video/mp4"), (status = 206, content_type = "video/mp4"), (status = 404, body = Problem)))]
+    responses((status = 200, content_type = "video/mp4"), (status = 206, content_type = "video/mp4"),
+        (status = 404, body = Problem),
+        (status = 410, body = Problem, description = "/problems/clip-gone: the clip is known and its bytes are gone")))]
 pub async fn file(
     State(app): State<AppState>,
     Path(name): Path<String>,
@@ -31,18 +34,17 @@ pub async fn file(
     let tag =
         HeaderValue::from_str(&format!("\"{}\"", clip.sha256)).map_err(|_| Problem::internal())?;
     if request.headers().get(header::IF_NONE_MATCH) == Some(&tag) {
-        return Ok((axum::http::StatusCode::NOT_MODIFIED, [(header::ETAG, tag)]).into_response());
+        return Ok((StatusCode::NOT_MODIFIED, [(header::ETAG, tag)]).into_response());
     }
     let Ok(served) = ServeFile::new(path).oneshot(request).await;
     let mut response = served.into_response();
-    if response.status().is_client_error()
-        && response.status() != axum::http::StatusCode::RANGE_NOT_SATISFIABLE
+    if response.status().is_client_error() && response.status() != StatusCode::RANGE_NOT_SATISFIABLE
     {
         tracing::error!(
             "the bytes of clip {} are gone from the data folder",
             clip.sha256
         );
-        return Err(Problem::internal());
+        return Err(Problem::clip_gone());
     }
     let headers = response.headers_mut();
     headers.insert(

@@ -22,6 +22,7 @@ const CURVES: &[&str] = &[
     "metrics",
     "session_offered",
     "session_closed",
+    "refitted",
     "evaluation",
     "finished",
 ];

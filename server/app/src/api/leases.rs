@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use store::{Lease, LeaseClip, NewAnswer, Progress, Queue, RunRow, Timing, now_ms, rfc3339};
 use utoipa::ToSchema;
 
+use super::clips;
 use crate::extract::{Answerer, Body, Path, Run};
 use crate::problem::Problem;
 use crate::state::AppState;
@@ -315,7 +316,7 @@ fn lease_view(lease: Lease) -> LeaseView {
 fn clip_view(clip: Option<LeaseClip>) -> ClipView {
     match clip {
         Some(clip) => ClipView {
-            clip: Some(format!("/api/v1/clips/{}.mp4", clip.sha256)),
+            clip: Some(clips::address(&clip.sha256)),
             n_frames: clip.n_frames,
             fps: clip.fps,
         },
@@ -370,7 +371,7 @@ fn queue_view(
         _ if queue.n_drawing > 0 => match app.live.clip_trouble() {
             Some(trouble) => view(
                 "drawing",
-                &format!("Clips cannot be drawn: {trouble}"),
+                &format!("There are no clips to show: {trouble}"),
                 None,
             ),
             None => view("drawing", "The next clips are being drawn.", None),

@@ -5,14 +5,14 @@ use axum::extract::State;
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use domain::teacher::TeacherSettings;
-use lab::config::{Layers, RunConfig};
+use lab::config::{Layers, RunConfig, find_teacher};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use store::{NewRun, RunId, RunRow, rfc3339};
 use utoipa::ToSchema;
 
 use crate::extract::{Body, Run};
-use crate::live::HUMAN;
+use crate::live::{HTTP, HUMAN};
 use crate::problem::Problem;
 use crate::state::AppState;
 
@@ -219,7 +219,7 @@ pub async fn create_token(
         None => false,
     };
     if is_teacher || labeler(&app, &headers).await?.is_some() {
-        return Err(Problem::teachers_only());
+        return Err(Problem::researchers_only());
     }
     let secret = app.store.add_teacher_token(run.id).await?;
     Ok((
@@ -236,18 +236,8 @@ pub async fn create_token(
 /// # Errors
 /// An unknown task, method, preset, teacher or setting.
 pub async fn start(app: &AppState, request: RunRequest) -> Result<RunId, Problem> {
-    let teacher = request.teacher.unwrap_or_else(|| "human".into());
-    let scripted: Vec<&str> = domain::teacher::SCRIPTED
-        .iter()
-        .map(|(name, _)| *name)
-        .collect();
-    let is_answered_outside = matches!(teacher.as_str(), "human" | "http");
-    if !is_answered_outside && !scripted.contains(&teacher.as_str()) {
-        let known = format!("human, http, {}", scripted.join(", "));
-        return Err(Problem::unusable_settings(format!(
-            "there is no teacher '{teacher}'; known: {known}"
-        )));
-    }
+    let teacher = request.teacher.unwrap_or_else(|| HUMAN.into());
+    find_teacher(&teacher, &[HUMAN, HTTP])?;
     let mut overrides = Vec::new();
     flatten("", &request.settings, &mut overrides);
     overrides.extend(request.seed.map(|seed| format!("seed={seed}")));
@@ -259,9 +249,9 @@ pub async fn start(app: &AppState, request: RunRequest) -> Result<RunId, Problem
         file: None,
         overrides,
     };
-    let config = RunConfig::resolve(&layers)?;
+    let config = RunConfig::resolve_from("settings", &layers)?;
     let new = NewRun {
-        draws_clips: request.draw_clips.unwrap_or(teacher == "human"),
+        draws_clips: request.draw_clips.unwrap_or(teacher == HUMAN),
         task: config.task.clone(),
         method: config.method.clone(),
         preset: preset.unwrap_or_default(),
@@ -277,7 +267,7 @@ pub async fn start(app: &AppState, request: RunRequest) -> Result<RunId, Problem
     Ok(id)
 }
 
-/// `{"a": {"b": 1}}` and `{"a.b": 1}` alike become `a.b=1`, as on the command line.
+/// `{"a": {"b": 1}}` and `{"a.b": 1}` alike become `a.b=1`, which layers take.
 fn flatten(prefix: &str, settings: &Map<String, Value>, overrides: &mut Vec<String>) {
     for (key, value) in settings {
         let path = if prefix.is_empty() {

@@ -1,8 +1,9 @@
 //! The API of a server, as a program outside uses it: documented routes only.
 
-use std::io::Write;
+use std::io::{Read, Write};
 use std::time::{Duration, Instant};
 
+use anyhow::Context as _;
 use serde::Serialize;
 use serde_json::Value;
 use ureq::http::{Response, StatusCode};
@@ -10,7 +11,8 @@ use ureq::{Agent, Body};
 
 use super::BadInput;
 
-/// How long one request may take before it is sent again.
+/// How long one request may take before it is sent again, and a table may stand still before it is
+/// given up.
 const REQUEST_TIMEOUT: Duration = Duration::from_secs(30);
 /// Pause between two tries while a server is away.
 const RETRY_PAUSE: Duration = Duration::from_millis(250);
@@ -25,6 +27,7 @@ pub(super) struct Client {
     cookie: Option<String>,
     /// How long a server that answered once may be away.
     patience: Duration,
+    timeout: Duration,
     has_answered: bool,
 }
 
@@ -34,6 +37,10 @@ impl Client {
     /// # Errors
     /// [`BadInput`] for an address that is none.
     pub(super) fn new(server: &str, patience: Duration) -> anyhow::Result<Self> {
+        Self::with_timeout(server, patience, REQUEST_TIMEOUT)
+    }
+
+    fn with_timeout(server: &str, patience: Duration, timeout: Duration) -> anyhow::Result<Self> {
         let server = server.trim_end_matches('/').to_owned();
         if server.starts_with("https://") {
             let told = format!(
@@ -51,7 +58,7 @@ impl Client {
             .into());
         }
         let config = Agent::config_builder()
-            .timeout_global(Some(REQUEST_TIMEOUT))
+            .timeout_global(Some(timeout))
             .http_status_as_error(false)
             .proxy(None)
             .build();
@@ -61,6 +68,7 @@ impl Client {
             token: None,
             cookie: None,
             patience,
+            timeout,
             has_answered: false,
         })
     }
@@ -103,17 +111,23 @@ impl Client {
         })?)
     }
 
-    /// Copies the body of `GET path`, byte for byte, as it arrives.
+    /// Copies the body of `GET path`, byte for byte, as it arrives: however long that takes, as
+    /// long as some of it comes.
     ///
     /// # Errors
-    /// As [`Client::send`]; a connection that breaks, or an output that cannot be written.
+    /// As [`Client::send`]; a body that breaks off, or an output that cannot be written.
     pub(super) fn download(&mut self, path: &str, to: &mut impl Write) -> anyhow::Result<()> {
+        let timeout = Some(self.timeout);
         let mut response = self.send(path, |client, url| {
-            client.request(client.agent.get(url)).call()
+            let request = client.agent.get(url).config();
+            let request = request.timeout_global(None).timeout_connect(timeout);
+            let request = request.timeout_recv_response(timeout);
+            client
+                .request(request.timeout_per_read(timeout).build())
+                .call()
         })?;
         let body = response.body_mut().with_config().limit(u64::MAX);
-        std::io::copy(&mut body.reader(), to)?;
-        Ok(())
+        copy(&mut body.reader(), to, self.timeout)
     }
 
     /// The JSON body that answers `POST path`.
@@ -256,6 +270,31 @@ fn json(mut response: Response<Body>) -> anyhow::Result<Value> {
         })
 }
 
+/// Copies a table to its end.
+///
+/// * `timeout` – how long it may stand still
+fn copy(from: &mut impl Read, to: &mut impl Write, timeout: Duration) -> anyhow::Result<()> {
+    let mut buffer = vec![0; 64 * 1024];
+    let mut n_bytes = 0;
+    loop {
+        let n = match from.read(&mut buffer) {
+            Ok(0) => return Ok(()),
+            Ok(n) => n,
+            Err(error) => {
+                let cause = error.get_ref();
+                let why = match cause.and_then(|cause| cause.downcast_ref::<ureq::Error>()) {
+                    Some(ureq::Error::Timeout(_)) => format!("nothing came for {timeout:?}"),
+                    _ => error.to_string(),
+                };
+                anyhow::bail!("the table broke off after {n_bytes} bytes: {why}; try again");
+            }
+        };
+        to.write_all(&buffer[..n])
+            .context("cannot write the table")?;
+        n_bytes += n;
+    }
+}
+
 /// An id becomes part of an address, so it must not be more than one part of it.
 ///
 /// # Errors
@@ -274,7 +313,61 @@ pub(super) fn path_segment(id: &str) -> anyhow::Result<&str> {
 
 #[cfg(test)]
 mod tests {
+    use std::io::{BufRead as _, BufReader};
+    use std::net::TcpListener;
+
     use super::*;
+
+    const TIMEOUT: Duration = Duration::from_secs(1);
+
+    /// A server that answers one request with a table of a hundred bytes: ten of them at a time,
+    /// `pause` after each, and no more than `n_parts` times. Its address.
+    fn table(n_parts: u32, pause: Duration) -> String {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let address = listener.local_addr().unwrap();
+        std::thread::spawn(move || {
+            let (mut stream, _) = listener.accept().unwrap();
+            let request = BufReader::new(&stream).lines().map_while(Result::ok);
+            request.take_while(|line| !line.is_empty()).for_each(drop);
+            write!(stream, "HTTP/1.1 200 OK\r\ncontent-length: 100\r\n\r\n").unwrap();
+            for _ in 0..n_parts {
+                stream.write_all(b"0123456789").unwrap();
+                std::thread::sleep(pause); // how slowly it comes is the point
+            }
+        });
+        format!("http://{address}")
+    }
+
+    fn download(server: &str) -> anyhow::Result<Vec<u8>> {
+        let mut client = Client::with_timeout(server, Duration::ZERO, TIMEOUT)?;
+        let mut bytes = Vec::new();
+        client.download("/table", &mut bytes)?;
+        Ok(bytes)
+    }
+
+    #[test]
+    fn a_table_may_take_longer_than_a_request_while_some_of_it_comes() {
+        let bytes = download(&table(10, TIMEOUT / 5)).unwrap();
+        assert_eq!(bytes.len(), 100);
+    }
+
+    #[test]
+    fn a_table_that_breaks_off_is_told_with_how_much_came() {
+        let told = download(&table(3, Duration::ZERO)).unwrap_err();
+        let told = told.to_string();
+        assert!(
+            told.starts_with("the table broke off after 30 bytes: "),
+            "{told}"
+        );
+        assert!(told.ends_with("; try again"), "{told}");
+    }
+
+    #[test]
+    fn a_table_that_stands_still_is_given_up() {
+        let told = download(&table(1, 10 * TIMEOUT)).unwrap_err();
+        let expected = "the table broke off after 10 bytes: nothing came for 1s; try again";
+        assert_eq!(told.to_string(), expected);
+    }
 
     #[test]
     fn an_id_that_would_change_the_address_is_refused() {

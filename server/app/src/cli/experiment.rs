@@ -130,7 +130,7 @@ impl Chosen {
     /// A file, or the name of one that comes with the program.
     fn open(name: &str, is_small: bool) -> anyhow::Result<Self> {
         let path = Path::new(name);
-        let (text, stem) = if path.exists() || path.extension().is_some_and(|e| e == "toml") {
+        let (text, stem) = if is_path(path) {
             let text = std::fs::read_to_string(path)
                 .map_err(|error| BadInput(format!("cannot read {name}: {error}")))?;
             let stem = path.file_stem().unwrap_or_default();
@@ -148,6 +148,14 @@ impl Chosen {
         };
         Ok(Self { grid, text, stem })
     }
+}
+
+/// Whether a file is meant, there or not, and no name of one that comes with the program. A folder
+/// hides no such name: `--out` may have made it.
+fn is_path(path: &Path) -> bool {
+    path.is_file()
+        || path.extension().is_some_and(|ending| ending == "toml")
+        || path.components().count() > 1
 }
 
 /// `3 h 20 min`, for people who plan their week.

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Subcommand;
+use domain::nearest::nearest;
 use domain::query::Question;
-use lab::nearest::nearest;
 use lab::study::{READY, StudyFile};
 
 use super::{BadInput, say};

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use anyhow::Context as _;
 use domain::teacher::{Judge, Scripted, TeacherSettings};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use lab::config::{Layers, RunConfig};
+use lab::config::{Layers, RunConfig, scripted_teacher};
 use lab::history::Sitting;
 use lab::message::{Command, Event};
 use lab::run::{Outcome, Run};
@@ -206,19 +206,7 @@ pub(super) fn judge(
     seed: u64,
     settings: &TeacherSettings,
 ) -> anyhow::Result<Box<dyn Judge>> {
-    domain::teacher::judge(name, seed, settings).ok_or_else(|| {
-        let known: Vec<&str> = domain::teacher::SCRIPTED
-            .iter()
-            .map(|(name, _)| *name)
-            .collect();
-        let hint = lab::nearest::nearest(name, &known).map(|n| format!(" (did you mean '{n}'?)"));
-        let hint = hint.unwrap_or_default();
-        BadInput(format!(
-            "there is no teacher '{name}'{hint}; known: {}",
-            known.join(", ")
-        ))
-        .into()
-    })
+    scripted_teacher(name, seed, settings).map_err(BadInput::from_error)
 }
 
 /// Ctrl-C, or the end of stdin where that is asked for, leaves a checkpoint.

@@ -1,19 +1,21 @@
 //! The thread that owns the graphics device: recorded poses in, clips in the store out.
 
-use std::collections::VecDeque;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::mpsc::{Receiver, Sender, channel};
-use std::sync::{Arc, OnceLock};
+use std::sync::mpsc::{Sender, channel};
+use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 
 use lab::message::Demonstration;
 use render::clip::{Clip, encode, frames_per_second};
 use render::{CLIP_SIZE, Renderer};
-use serde_json::json;
-use store::{ClipJob, NewClip, NewDemonstration, RunId, Store, StoreError};
+use store::{ClipJob, NewClip, NewDemonstration, RunId, Store};
 use tokio::runtime::Handle;
 
-use super::panic_text;
+use super::{lock, panic_text};
+
+mod desk;
+
+use desk::Desk;
 
 /// Pictures in a demonstration's clip at most: longer episodes are shown in fast motion.
 const DEMONSTRATION_FRAMES: usize = 125;
@@ -23,7 +25,15 @@ const DEMONSTRATION_FPS: u32 = 25;
 #[derive(Clone)]
 pub struct ClipQueue {
     sender: Sender<Message>,
-    trouble: Arc<OnceLock<String>>,
+    trouble: Arc<Mutex<Option<Trouble>>>,
+}
+
+/// Why no clips come.
+struct Trouble {
+    /// What is wrong, with what to do about it.
+    told: String,
+    /// Whether it is tried again and again; else none will come before the server starts anew.
+    is_passing: bool,
 }
 
 enum Message {
@@ -59,9 +69,17 @@ impl ClipQueue {
         self.send(Message::Close);
     }
 
-    /// Why clips cannot be drawn on this machine, with what to do about it.
-    pub fn trouble(&self) -> Option<&str> {
-        self.trouble.get().map(String::as_str)
+    /// Why no clips come at the moment, with what to do about it.
+    pub fn trouble(&self) -> Option<String> {
+        let trouble = lock(&self.trouble);
+        trouble.as_ref().map(|trouble| trouble.told.clone())
+    }
+
+    /// The same, where waiting does not help.
+    pub fn lasting_trouble(&self) -> Option<String> {
+        let trouble = lock(&self.trouble);
+        let lasting = trouble.as_ref().filter(|trouble| !trouble.is_passing);
+        lasting.map(|trouble| trouble.told.clone())
     }
 
     fn send(&self, message: Message) {
@@ -89,17 +107,17 @@ pub fn start(store: Store, runtime: Handle) -> std::io::Result<(ClipQueue, JoinH
                 renderer.device_name()
             );
             let worker = Worker {
-                store,
-                runtime,
+                desk: Desk::new(store, runtime, messages, trouble),
                 renderer,
-                messages,
-                demonstrations: VecDeque::new(),
             };
             worker.work();
         }
         Err(error) => {
             tracing::error!("{error}");
-            let _ = trouble.set(error.to_string()); // set once, here
+            *lock(&trouble) = Some(Trouble {
+                told: error.to_string(),
+                is_passing: false,
+            });
         }
     };
     let thread = std::thread::Builder::new()
@@ -109,83 +127,37 @@ pub fn start(store: Store, runtime: Handle) -> std::io::Result<(ClipQueue, JoinH
 }
 
 struct Worker {
-    store: Store,
-    runtime: Handle,
+    desk: Desk,
     renderer: Renderer,
-    messages: Receiver<Message>,
-    demonstrations: VecDeque<(RunId, String, Demonstration)>,
 }
 
 impl Worker {
     /// Queries first, in the order in which they are asked; demonstrations when nobody waits.
     fn work(mut self) {
-        loop {
-            while let Ok(message) = self.messages.try_recv() {
-                if !self.take(message) {
-                    return;
+        while self.desk.take_all() {
+            let goes_on = if let Some(job) = self.desk.next_job() {
+                let drawn = self.draw_query(&job);
+                if let Err(reason) = &drawn {
+                    tracing::error!(run.id = %job.run, "a query's clips cannot be drawn: {reason}");
                 }
-            }
-            let job = self
-                .runtime
-                .block_on(self.store.next_clip_job())
-                .unwrap_or_else(|error| {
-                    tracing::error!("cannot read which clips to draw: {error}");
-                    None
-                });
-            if let Some(job) = job {
-                self.draw_query(&job);
-            } else if let Some((run, task, demonstration)) = self.demonstrations.pop_front() {
+                self.desk.keep(&job, &drawn)
+            } else if let Some((run, task, demonstration)) = self.desk.next_demonstration() {
                 self.draw_demonstration(run, &task, &demonstration);
+                true
             } else {
-                let Ok(message) = self.messages.recv() else {
-                    return;
-                };
-                if !self.take(message) {
-                    return;
-                }
+                self.desk.wait()
+            };
+            if !goes_on {
+                return;
             }
         }
     }
 
-    /// Whether to go on.
-    fn take(&mut self, message: Message) -> bool {
-        match message {
-            Message::Wake => {}
-            Message::Demonstration {
-                run,
-                task,
-                demonstration,
-            } => {
-                self.demonstrations.push_back((run, task, demonstration));
-            }
-            Message::Close => return false,
-        }
-        true
-    }
-
-    fn draw_query(&mut self, job: &ClipJob) {
-        let drawn = self
-            .draw(&job.task, &job.first, frames_per_second(job.first.len()))
-            .and_then(|first| {
-                let second =
-                    self.draw(&job.task, &job.second, frames_per_second(job.second.len()))?;
-                Ok([first, second])
-            });
-        let stored = match drawn {
-            Ok([first, second]) => self.runtime.block_on(self.store.attach_clips(
-                job.query,
-                &new_clip(first),
-                &new_clip(second),
-            )),
-            Err(reason) => {
-                tracing::error!(run.id = %job.run, "a query's clips cannot be drawn: {reason}");
-                self.runtime
-                    .block_on(self.store.clip_failed(job.query, &reason))
-            }
-        };
-        if let Err(error) = stored {
-            tracing::error!(run.id = %job.run, "a query's clips could not be stored: {error}");
-        }
+    /// Both clips of a query, or why they cannot be drawn.
+    fn draw_query(&mut self, job: &ClipJob) -> Result<[NewClip; 2], String> {
+        let first = self.draw(&job.task, &job.first, frames_per_second(job.first.len()))?;
+        let second = self.draw(&job.task, &job.second, frames_per_second(job.second.len()))?;
+        Ok([first, second].map(new_clip))
     }
 
     fn draw_demonstration(&mut self, run: RunId, task: &str, demonstration: &Demonstration) {
@@ -215,39 +187,12 @@ impl Worker {
         };
         let drawn = self.draw(task, &poses, DEMONSTRATION_FPS);
         let stored = drawn.and_then(|clip| {
-            let stored = self.runtime.block_on(self.keep(run, shows, new_clip(clip)));
+            let stored = self.desk.keep_demonstration(run, shows, &new_clip(clip));
             stored.map_err(|error| error.to_string())
         });
         if let Err(reason) = stored {
             tracing::error!(run.id = %run, "a demonstration could not be drawn or stored: {reason}");
         }
-    }
-
-    /// The clip first, then the event that shows it; an episode that a killed run shows again
-    /// makes no second event.
-    async fn keep(
-        &self,
-        run: RunId,
-        shows: NewDemonstration,
-        clip: NewClip,
-    ) -> Result<(), StoreError> {
-        self.store.add_demonstration(run, shows, &clip).await?;
-        let NewDemonstration {
-            session,
-            step,
-            success,
-            task_return,
-        } = shows;
-        let event = json!({
-            "kind": "clips", "what": "demonstration", "session": session, "step": step, "success": success,
-            "task_return": task_return, "clip": format!("/api/v1/clips/{}.mp4", clip.sha256),
-        });
-        let name = session.map_or_else(
-            || "demonstration/end".to_owned(),
-            |s| format!("demonstration/{s}"),
-        );
-        self.store.append_event(run, &name, &event).await?;
-        Ok(())
     }
 
     /// Draws and encodes. A device that fails is opened anew once: drivers do stop.

@@ -8,7 +8,7 @@ use std::time::Instant;
 
 use anyhow::Context as _;
 use domain::teacher::{Scripted, Teacher};
-use lab::config::RunConfig;
+use lab::config::{RunConfig, scripted_teacher};
 use lab::history::Sitting;
 use lab::message::{Command, Event, Phase};
 use lab::run::{Outcome, Run};
@@ -24,6 +24,11 @@ use crate::provenance;
 pub const HUMAN: &str = "human";
 /// A program over HTTP; clips are not drawn for it.
 pub const HTTP: &str = "http";
+
+/// Kind of the event of a checkpoint that was passed over; its `complaint` says why.
+pub const DAMAGED_CHECKPOINT: &str = "damaged_checkpoint";
+/// Kind of the event of a history that was set aside; its `complaint` says why.
+pub const DAMAGED_HISTORY: &str = "damaged_history";
 
 fn is_over_http(teacher: &str) -> bool {
     matches!(teacher, HUMAN | HTTP)
@@ -74,7 +79,7 @@ impl Driver {
         let (sitting, complaint) = Sitting::begin(&folder, &here, began)?;
         if let Some(complaint) = complaint {
             tracing::warn!(run.id = %self.run, "{complaint}");
-            self.log(&json!({"kind": "damaged_history", "complaint": complaint}));
+            self.log(&json!({"kind": DAMAGED_HISTORY, "complaint": complaint}));
         }
         let mut teacher = self.teacher(&row, &run)?;
         let outcome = sitting.drive(&mut run, teacher.as_mut(), commands, &mut |event| {
@@ -96,7 +101,7 @@ impl Driver {
         let (run, complaints) = Run::resume(&folder)?;
         for complaint in complaints {
             tracing::warn!(run.id = %self.run, "passed over a damaged checkpoint: {complaint}");
-            self.log(&json!({"kind": "damaged_checkpoint", "complaint": complaint}));
+            self.log(&json!({"kind": DAMAGED_CHECKPOINT, "complaint": complaint}));
         }
         Ok(run)
     }
@@ -108,8 +113,7 @@ impl Driver {
             let (store, runtime) = (self.inner.store.clone(), self.inner.runtime.clone());
             return Ok(Box::new(HumanTeacher::new(store, runtime, self.run, clips)));
         }
-        let judge = domain::teacher::judge(name, run.config().seed, &run.config().teacher);
-        let judge = judge.with_context(|| format!("there is no teacher '{name}'"))?;
+        let judge = scripted_teacher(name, run.config().seed, &run.config().teacher)?;
         Ok(Box::new(Scripted::new(judge, run.consumed_sequence())))
     }
 
@@ -144,6 +148,7 @@ impl Driver {
         let (step, n_labels) = match event {
             Event::Metrics(row) => (row.step, row.labels),
             Event::SessionClosed(row) => (row.step, row.labels),
+            Event::Refitted(row) => (row.step, row.labels),
             Event::Evaluation(row) => (row.step, row.labels),
             Event::Finished(row) => (row.step, row.labels),
             _ => return,
@@ -196,6 +201,7 @@ fn name(event: &Value) -> String {
         part("kind"),
         part("step"),
         part("session"),
+        part("fit"),
         part("consumed_sequence"),
         part("complaint"),
     ];

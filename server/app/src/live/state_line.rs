@@ -4,6 +4,7 @@
 
 use lab::config::RunConfig;
 use lab::message::{Activity, Finished, Phase};
+use lab::words::thousands;
 
 /// What a page shows beside a run's name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -148,19 +149,6 @@ impl StateLine {
     }
 }
 
-/// 12345 → `12,345`.
-fn thousands(n: u64) -> String {
-    let digits = n.to_string();
-    let mut text = String::new();
-    for (place, digit) in digits.chars().enumerate() {
-        if place > 0 && (digits.len() - place).is_multiple_of(3) {
-            text.push(',');
-        }
-        text.push(digit);
-    }
-    text
-}
-
 fn plural(n: u32, one: &'static str, many: &'static str) -> &'static str {
     if n == 1 { one } else { many }
 }
@@ -204,20 +192,6 @@ mod tests {
         assert_eq!(
             line(Activity::Learning, Some(40_000), None).next,
             "finishes at step 40,000"
-        );
-    }
-
-    #[test]
-    fn large_numbers_are_grouped() {
-        assert_eq!(
-            [
-                thousands(0),
-                thousands(999),
-                thousands(1_000),
-                thousands(1_234_567)
-            ]
-            .join(" "),
-            "0 999 1,000 1,234,567"
         );
     }
 }

@@ -94,7 +94,7 @@ fn wait_for_clips(inner: &Inner, id: StudyId) -> anyhow::Result<bool> {
         if row.n_drawn == row.n_items {
             return Ok(true);
         }
-        if let Some(trouble) = inner.clips.trouble() {
+        if let Some(trouble) = inner.clips.lasting_trouble() {
             bail!("clips cannot be drawn: {trouble}");
         }
         if row.n_drawn + row.n_bad == row.n_items {

@@ -5,10 +5,11 @@ use axum::extract::State;
 use axum::http::{HeaderValue, header};
 use axum::response::{IntoResponse as _, Response};
 use lab::experiment::Artifact;
+use lab::words::thousands;
 
 use super::experiments::state;
 use super::markdown::to_html;
-use super::{show, thousands};
+use super::show;
 use crate::experiments::{self, Experiment, Running};
 use crate::extract::Path;
 use crate::problem::Problem;
@@ -59,9 +60,9 @@ struct Figure {
 /// Files of a report that are pictures, with their headings.
 const FIGURES: &[(&str, &str)] = &[
     ("success.svg", "Success over environment steps"),
-    ("success-by-budget.svg", "Success by the number of answers"),
+    ("success-by-budget.svg", "Success by the budget of answers"),
     ("return.svg", "Return over environment steps"),
-    ("return-by-budget.svg", "Return by the number of answers"),
+    ("return-by-budget.svg", "Return by the budget of answers"),
     (
         "stage-gaps.svg",
         "Stage gap of chosen pairs and of all candidates",
@@ -190,6 +191,31 @@ fn left(seconds: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use lab::experiment::results::Results;
+
+    #[test]
+    fn links_lead_to_a_folder_whose_name_has_other_uses_in_addresses() {
+        let experiment = Experiment {
+            name: "c#2".into(),
+            title: "Three of them".into(),
+            about: String::new(),
+            rows: String::new(),
+            results: Ok(Results::default()),
+            settings: Vec::new(),
+            progress: None,
+            is_shipped: false,
+        };
+        let report = [Artifact {
+            name: "success.svg".into(),
+            text: String::new(),
+        }];
+        let html = filled(&experiment, &report).render().unwrap();
+        for file in ["success.svg", "success.csv", "report.md", "results.jsonl"] {
+            let link = format!("\"/experiments/c%232/{file}\"");
+            assert!(html.contains(&link), "{link} is not in: {html}");
+        }
+        assert!(!html.contains("c#2/"), "{html}");
+    }
 
     #[test]
     fn the_time_left_is_told_in_a_unit_that_fits() {

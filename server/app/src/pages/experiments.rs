@@ -3,8 +3,9 @@
 use askama::Template;
 use axum::extract::State;
 use axum::response::Response;
+use lab::words::thousands;
 
-use super::{show, thousands};
+use super::show;
 use crate::experiments::{self, Experiment};
 use crate::problem::Problem;
 use crate::state::AppState;
@@ -83,4 +84,28 @@ pub(super) fn state(experiment: &Experiment) -> String {
         ""
     };
     finished + &failed + working
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_has_its_folders_name_and_links_that_lead_there() {
+        let line = Line {
+            name: "c#2".into(),
+            title: "Three of them (small variant)".into(),
+            state: "3 runs".into(),
+            is_up: false,
+            origin: "in the data folder",
+        };
+        let page = ExperimentsPage {
+            lines: vec![line],
+            has_lines: true,
+        };
+        let html = page.render().unwrap();
+        assert_eq!(html.matches("\"/experiments/c%232\"").count(), 2, "{html}");
+        assert!(html.contains("in the data folder"), "{html}");
+        assert!(!html.contains("/experiments/c#2"), "{html}");
+    }
 }

@@ -8,10 +8,11 @@ use axum::response::{Redirect, Response};
 use lab::config::{Layers, RunConfig};
 use lab::cost::time_here;
 use lab::figure::shown_method;
+use lab::words::thousands;
 use serde::Deserialize;
 use serde_json::{Map, json};
 
-use super::{show, thousands, title};
+use super::{show, title};
 use crate::api::runs::{self, RunRequest, RunView};
 use crate::assets;
 use crate::extract::Form;

@@ -5,12 +5,13 @@ use axum::extract::State;
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse as _, Redirect, Response};
 use domain::query::Question;
+use lab::words::thousands;
 use serde::Deserialize;
 use store::{RunRow, StudyRow};
 
 use super::guidance::{Guidance, guidance, guidance_with, text};
 use super::join::nobody_here;
-use super::{show, thousands, title};
+use super::{show, title};
 use crate::api::labelers;
 use crate::extract::{Form, Run, labeler};
 use crate::live::parse_study;

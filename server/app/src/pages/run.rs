@@ -3,14 +3,15 @@
 use askama::Template;
 use axum::extract::State;
 use axum::response::{Redirect, Response};
-use store::{AnsweredPair, DemonstrationRow, RunId};
+use lab::words::thousands;
+use store::{AnsweredPair, DemonstrationRow, EventRow, RunId};
 
 use super::home::method_name;
-use super::{percent, show, thousands, time_of_day, title};
+use super::{percent, show, time_of_day, title};
 use crate::api::clips::address;
 use crate::api::runs::{self, RunView};
 use crate::extract::Run;
-use crate::live::HUMAN;
+use crate::live::{DAMAGED_CHECKPOINT, DAMAGED_HISTORY, HTTP, HUMAN};
 use crate::problem::Problem;
 use crate::state::AppState;
 
@@ -59,7 +60,8 @@ struct RunPage {
     /// What the researcher should know about, in words.
     broken: Vec<String>,
     has_broken: bool,
-    n_broken: usize,
+    /// Changes when any of it does.
+    broken_version: String,
     /// The first and the newest episode of the policy.
     first: Shown,
     latest: Shown,
@@ -204,7 +206,7 @@ pub async fn page(State(app): State<AppState>, Run(row): Run) -> Result<Response
             format!("{n_same} of {n_judged}")
         },
         has_broken: !broken.is_empty(),
-        n_broken: broken.len(),
+        broken_version: broken.join(" "),
         broken,
         has_demonstration: !demonstrations.is_empty(),
         demonstrations_version: demonstrations.len().to_string(),
@@ -265,7 +267,7 @@ fn none_yet() -> String {
 fn method_words(run: &RunView) -> String {
     let teacher = match run.teacher.as_str() {
         HUMAN => "people answer".to_owned(),
-        "http" => "a program answers".to_owned(),
+        HTTP => "a program answers".to_owned(),
         script => format!("the script '{script}' answers"),
     };
     let preset = if run.preset.is_empty() {
@@ -289,17 +291,34 @@ async fn last_success(app: &AppState, run: RunId) -> Result<Option<f64>, Problem
     Ok(last.and_then(|event| event["success_rate"].as_f64()))
 }
 
+/// What the researcher should know about: no clips at the moment, pairs without clips, and what of
+/// the run's own files was damaged.
 async fn broken(app: &AppState, run: RunId) -> Result<Vec<String>, Problem> {
     let bad = app.store.bad_queries(run).await?;
-    let lines = bad.iter().map(|query| {
+    let kinds = [DAMAGED_CHECKPOINT, DAMAGED_HISTORY];
+    let damaged = app.store.events_of(run, &kinds).await?;
+    let bad = bad.iter().map(|query| {
         format!(
             "A pair of round {} cannot be shown: {}.",
             query.session + 1,
             query.trouble
         )
     });
-    let trouble = app.live.clip_trouble().map(str::to_owned);
-    Ok(trouble.into_iter().chain(lines).collect())
+    let trouble = app.live.clip_trouble();
+    let damaged = damaged.iter().map(damage);
+    Ok(trouble.into_iter().chain(bad).chain(damaged).collect())
+}
+
+/// An event of a damaged file, in words.
+fn damage(event: &EventRow) -> String {
+    let data: serde_json::Value = serde_json::from_str(&event.data).unwrap_or_default();
+    let complaint = data["complaint"].as_str().unwrap_or_default();
+    let what = if event.kind == DAMAGED_CHECKPOINT {
+        "A damaged checkpoint was passed over"
+    } else {
+        "The record of the run's time and revisions was damaged"
+    };
+    format!("{what}: {complaint}.")
 }
 
 fn shown(when: &str, row: &DemonstrationRow) -> Shown {

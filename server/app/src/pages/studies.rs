@@ -4,10 +4,11 @@ use askama::Template;
 use axum::extract::State;
 use axum::response::{IntoResponse as _, Redirect, Response};
 use lab::study::{READY, StudyFile};
+use lab::words::thousands;
 use serde::Deserialize;
 use store::StudyRow;
 
-use super::{show, thousands, title};
+use super::{show, title};
 use crate::api::studies;
 use crate::extract::Form;
 use crate::problem::Problem;

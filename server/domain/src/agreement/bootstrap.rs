@@ -4,6 +4,8 @@ use super::center::mean;
 use super::interval::{Estimate, Interval};
 use crate::random::{Rng, Stream};
 
+mod sign_flip;
+
 /// How to resample. The same settings give the same interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bootstrap {

@@ -1,11 +1,12 @@
 //! From layers of TOML to one checked tree.
 
+use domain::nearest::nearest;
+use toml::de::DeTable;
 use toml::{Table, Value};
 
 use super::presets::preset;
 use super::{ConfigError, RunConfig, find_task};
 use crate::method;
-use crate::nearest::nearest;
 
 /// Where settings come from, least important first.
 #[derive(Debug, Clone, Default)]
@@ -28,6 +29,16 @@ impl RunConfig {
     /// # Errors
     /// [`ConfigError`] names the layer, the key or line, and the nearest right name.
     pub fn resolve(layers: &Layers) -> Result<Self, ConfigError> {
+        Self::resolve_from("--set", layers)
+    }
+
+    /// The same, where single settings were not typed as `--set`.
+    ///
+    /// * `origin` – what errors call the place where they were: `settings`
+    ///
+    /// # Errors
+    /// As [`RunConfig::resolve`].
+    pub fn resolve_from(origin: &str, layers: &Layers) -> Result<Self, ConfigError> {
         let file = layers
             .file
             .as_ref()
@@ -36,7 +47,7 @@ impl RunConfig {
         let overrides = layers
             .overrides
             .iter()
-            .map(|o| parse_override(o))
+            .map(|o| parse_override(origin, o))
             .collect::<Result<Vec<_>, _>>()?;
         let mut chosen = Table::new();
         for layer in file.iter().chain(&overrides) {
@@ -79,21 +90,27 @@ pub(super) fn parse_layer(origin: &str, text: &str) -> Result<Table, ConfigError
     toml::from_str(text).map_err(|e| invalid(origin, text, &e))
 }
 
-fn parse_override(text: &str) -> Result<Table, ConfigError> {
-    let origin = format!("--set {text}");
+fn parse_override(origin: &str, text: &str) -> Result<Table, ConfigError> {
+    let origin = format!("{origin} {text}");
     let Some((key, value)) = text.split_once('=') else {
         return Err(ConfigError::Invalid {
             origin,
             message: "write it as key=value".into(),
         });
     };
-    let is_bare = toml::from_str::<Table>(&format!("x = {value}")).is_err();
-    let value = if is_bare {
+    let value = if is_bare(value) {
         format!("{value:?}")
     } else {
         value.to_owned()
     };
     parse_layer(&origin, &format!("{key} = {value}"))
+}
+
+/// Whether a value is a word that lacks its quotes. Digits alone are none, not even where TOML
+/// cannot read them.
+fn is_bare(value: &str) -> bool {
+    let is_digits = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
+    !is_digits(value.trim()) && DeTable::parse(&format!("x = {value}")).is_err()
 }
 
 /// An error of TOML with its line, and the nearest right key where one is unknown.
@@ -121,23 +138,58 @@ pub(crate) fn invalid(origin: &str, text: &str, error: &toml::de::Error) -> Conf
     }
 }
 
-/// A message of serde's with the names of Rust's types put as what a person would write.
+/// A message of serde's or TOML's with the names of Rust's types put as what a person would write.
 pub fn plainly(message: &str) -> String {
+    if ["u64 value was too large", "integer number overflowed"].contains(&message) {
+        return format!("a whole number is at most {}", i64::MAX);
+    }
     let Some((found, expected)) = message.rsplit_once("expected ") else {
         return message.into();
     };
+    let found = found.replace("floating point", "number");
+    let found = found.replace("` as i128", "`").replace("` as u128", "`");
+    match wanted(expected, &found) {
+        Some(wanted) => format!("{found}expected {wanted}"),
+        None => message.into(),
+    }
+}
+
+/// What a person would write where serde expected something else than it found.
+fn wanted(expected: &str, found: &str) -> Option<String> {
     let wanted = match expected {
         "f32" | "f64" => "a number",
-        "u8" | "u16" | "u32" | "u64" | "usize" => "a whole number, 0 or more",
-        "i8" | "i16" | "i32" | "i64" | "isize" => "a whole number",
         "a boolean" => "true or false",
         "a sequence" => "a list, as in [256, 256]",
         "a string" => "text in quotes",
         _ if expected.starts_with("struct ") => "a table of settings",
-        _ => return message.into(),
+        _ => return wanted_whole(expected, found),
     };
-    let found = found.replace("floating point", "number");
-    format!("{found}expected {wanted}")
+    Some(wanted.to_owned())
+}
+
+/// The same for one of Rust's whole numbers, with the largest of its type where the number that
+/// was found is larger. TOML has none above those of `i64`.
+fn wanted_whole(expected: &str, found: &str) -> Option<String> {
+    let largest = match expected {
+        "u8" => i64::from(u8::MAX),
+        "u16" => i64::from(u16::MAX),
+        "u32" => i64::from(u32::MAX),
+        "i8" => i64::from(i8::MAX),
+        "i16" => i64::from(i16::MAX),
+        "i32" => i64::from(i32::MAX),
+        "u64" | "usize" | "i64" | "isize" => i64::MAX,
+        _ => return None,
+    };
+    let number = found.split('`').nth(1).and_then(|n| n.parse::<f64>().ok());
+    if number.is_some_and(|number| number >= largest as f64) {
+        return Some(format!("a whole number, at most {largest}"));
+    }
+    let least = if expected.starts_with('u') {
+        ", 0 or more"
+    } else {
+        ""
+    };
+    Some(format!("a whole number{least}"))
 }
 
 pub(super) fn merge(base: &mut Table, layer: &Table) {

@@ -237,6 +237,78 @@ fn a_value_of_the_wrong_kind_is_told_what_to_write_instead() {
 }
 
 #[test]
+fn a_whole_number_that_is_too_large_is_told_the_largest() {
+    let most_u64 = "at most 9223372036854775807"; // of TOML's
+    for (bad, wanted) in [
+        (
+            "feedback.budget=5000000000",
+            "integer `5000000000`, expected a whole number, at most 4294967295",
+        ),
+        ("seed=9223372036854775808", most_u64),
+        ("seed=18446744073709551616", most_u64),
+        ("exploration.neighbours=18446744073709551616", most_u64),
+        ("agent.hidden=[9223372036854775808]", most_u64),
+        (
+            "seed=999999999999999999999999999999999999999999",
+            "a whole number is at most 9223372036854775807",
+        ),
+        ("seed=-1", "expected a whole number, 0 or more"),
+    ] {
+        let told = RunConfig::resolve(&layers(&[], &[bad])).unwrap_err();
+        let told = told.to_string();
+        assert!(told.ends_with(wanted), "{told}");
+        assert!(!told.contains("string") && !told.contains("128"), "{told}");
+    }
+    let largest = layers(&[], &["seed=9223372036854775807"]);
+    let seed = RunConfig::resolve(&largest).unwrap().seed;
+    assert_eq!(seed, 9_223_372_036_854_775_807);
+}
+
+#[test]
+fn digits_that_are_no_number_are_not_called_text() {
+    let told = RunConfig::resolve(&layers(&[], &["seed=007"])).unwrap_err();
+    let told = told.to_string();
+    assert!(told.contains("leading zero"), "{told}");
+    let word = RunConfig::resolve(&layers(&[], &["seed=7up"])).unwrap_err();
+    assert!(word.to_string().contains("string \"7up\""), "{word}");
+    let none = layers(&[], &["queries.sampler="]);
+    assert_eq!(RunConfig::resolve(&none).unwrap().queries.sampler, "");
+}
+
+#[test]
+fn settings_that_nobody_typed_as_options_are_called_what_they_were() {
+    let wrong = layers(&[], &["feedback.bugdet=3"]);
+    let told = RunConfig::resolve_from("settings", &wrong).unwrap_err();
+    let told = told.to_string();
+    assert!(told.starts_with("settings feedback.bugdet=3: "), "{told}");
+    let told = RunConfig::resolve(&wrong).unwrap_err().to_string();
+    assert!(told.starts_with("--set feedback.bugdet=3: "), "{told}");
+}
+
+#[test]
+fn a_teacher_that_is_none_is_answered_with_the_nearest_who_may_answer() {
+    let told = |name, others: &[&str]| find_teacher(name, others).unwrap_err().to_string();
+    let scripted = told("orcale", &[]);
+    assert!(scripted.contains("did you mean 'oracle'"), "{scripted}");
+    let person = told("humna", &["human", "http"]);
+    assert!(person.contains("did you mean 'human'"), "{person}");
+    assert!(person.contains("known: human, http, oracle"), "{person}");
+    assert!(find_teacher("human", &[]).is_err());
+    for (name, _) in SCRIPTED {
+        assert_eq!(find_teacher(name, &[]), Ok(()));
+        assert!(scripted_teacher(name, 1, &TeacherSettings::default()).is_ok());
+    }
+    let none = scripted_teacher("nobody", 1, &TeacherSettings::default());
+    assert!(matches!(
+        none,
+        Err(ConfigError::UnknownName {
+            what: "teacher",
+            ..
+        })
+    ));
+}
+
+#[test]
 fn a_value_out_of_range_or_of_the_wrong_kind_is_refused() {
     for bad in [
         "environment.n_envs=0",

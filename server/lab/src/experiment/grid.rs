@@ -6,10 +6,11 @@
 
 use std::collections::BTreeSet;
 
-use domain::teacher::SCRIPTED;
 use toml::Spanned;
 
-use crate::config::{ConfigError, Layers, RunConfig, find_task, preset_names, unknown};
+use crate::config::{
+    ConfigError, Layers, RunConfig, find_task, find_teacher, preset_names, unknown,
+};
 use crate::method;
 
 mod file;
@@ -233,11 +234,7 @@ impl Reader<'_> {
         let teachers = match &axes.teachers {
             None => vec!["oracle".to_owned()],
             teachers => self.names(teachers.as_ref(), "teachers", |name| {
-                let known = SCRIPTED.iter().map(|(known, _)| *known);
-                let is_known = known.clone().any(|known| known == name);
-                is_known
-                    .then_some(())
-                    .ok_or_else(|| unknown("teacher", name, known))
+                find_teacher(name, &[])
             })?,
         };
         let settings = self.settings(axes)?;

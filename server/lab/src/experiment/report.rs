@@ -2,8 +2,6 @@
 //!
 //! Pure: the same rows give the same bytes.
 
-use std::collections::BTreeSet;
-
 use domain::teacher::SCRIPTED;
 
 use super::Artifact;
@@ -13,13 +11,16 @@ use crate::config::ConfigError;
 use crate::figure::{self, Between, CurveRow, FigureError, Request, Source};
 use crate::message::SessionOffered;
 
+mod budgets;
 mod comparable;
 mod csv;
+mod differences;
 mod group;
 mod markdown;
 mod numbers;
 mod score;
 
+use budgets::Budgets;
 pub use score::{Learned, Reached, Score, area, learned, reached, score};
 
 /// A file of rows.
@@ -116,9 +117,13 @@ pub fn make(files: &[RowFile], may_mix: bool) -> Result<Vec<Artifact>, ReportErr
         read.push((file.name.as_str(), Results::parse(&file.name, &file.text)?));
     }
     comparable::check(&read, may_mix)?;
+    // Failed in one file, a run may be finished in another.
+    let is_finished = |key: &RunKey| read.iter().any(|(_, results)| results.run(key).is_some());
     let failed = read
         .iter()
-        .flat_map(|(_, results)| results.failed.clone())
+        .flat_map(|(_, results)| &results.failed)
+        .filter(|(key, _)| !is_finished(key))
+        .cloned()
         .collect();
     let mut runs: Vec<RunResult> = read
         .into_iter()
@@ -164,7 +169,7 @@ pub fn make(files: &[RowFile], may_mix: bool) -> Result<Vec<Artifact>, ReportErr
             artifacts.extend(curves(
                 names[1],
                 &by_budget,
-                ("labels", y),
+                ("budget", y),
                 Between::Nothing,
             )?);
         }
@@ -222,6 +227,7 @@ fn evaluation_rows(runs: &[&RunResult]) -> Vec<CurveRow> {
             teacher: String::new(), // the setting tells it
             step: e.step,
             labels: e.labels,
+            budget: None,
             success_rate: e.success_rate,
             return_mean: e.return_mean,
             wall_s: None,
@@ -231,31 +237,23 @@ fn evaluation_rows(runs: &[&RunResult]) -> Vec<CurveRow> {
     runs.iter().flat_map(of_run).collect()
 }
 
-/// Each run's score at its budget, of methods that are there with several and for which a budget
-/// says all that tells their settings apart.
+/// Each run's score at its budget, where a figure has a place for it.
 fn budget_rows(runs: &[&RunResult]) -> Vec<CurveRow> {
-    let same = |a: &RunKey, b: &RunKey| {
-        (&a.task, &a.method, &a.teacher) == (&b.task, &b.method, &b.teacher)
-    };
-    let is_one_of_several = |run: &&&RunResult| {
-        let alike = || runs.iter().filter(|other| same(&run.key, &other.key));
-        let budgets: BTreeSet<u32> = alike().map(|other| other.end.budget).collect();
-        let settings: BTreeSet<&str> = alike().map(|other| other.key.setting.as_str()).collect();
-        budgets.len() > 1 && budgets.len() == settings.len()
-    };
     let row = |run: &&RunResult| CurveRow {
         task: run.key.task.clone(),
         method: run.key.method.clone(),
         seed: run.key.seed,
         setting: run.key.shown_teacher().to_owned(),
         teacher: String::new(), // the setting tells it
+        // What tells the points of a seed apart.
         step: u64::from(run.end.budget),
-        labels: run.end.budget,
+        labels: run.end.labels,
+        budget: Some(run.end.budget),
         success_rate: score(run).value,
         return_mean: score(run).value,
         wall_s: None,
     };
-    runs.iter().filter(is_one_of_several).map(row).collect()
+    Budgets::of(runs).shown.iter().map(row).collect()
 }
 
 /// The figures of stage gaps, where any method has them.

@@ -14,7 +14,7 @@ use crate::method;
 mod folder;
 mod settings;
 
-pub use folder::{GridFolder, Misfit, StoreError, read_rows};
+pub use folder::{FolderError, GridFolder, Misfit, read_rows};
 pub use settings::fingerprint;
 pub(crate) use settings::first_difference;
 
@@ -40,7 +40,7 @@ pub enum Content {
     /// The same session when its answers were there.
     Answered(SessionClosed),
     /// All rows of the run are above.
-    Finished(RunRow),
+    Finished(FinishedRow),
     /// The run could not go on; it is tried again at the next start.
     Failed {
         /// For the person who reads it.
@@ -58,7 +58,7 @@ pub enum Content {
 
 /// A run that is over, with all that comparing it needs.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct RunRow {
+pub struct FinishedRow {
     /// Environment steps taken.
     pub total_steps: u64,
     /// Answers that it was given.
@@ -114,7 +114,7 @@ pub fn rows_of_run(
             Event::Finished(f) => {
                 let asks = method::find(&config.method)
                     .is_ok_and(|method| (method.build)(config).sampler.is_some());
-                rows.push(row(Content::Finished(RunRow {
+                rows.push(row(Content::Finished(FinishedRow {
                     total_steps: f.step,
                     labels: f.labels,
                     budget: if asks { config.feedback.budget } else { 0 },
@@ -159,7 +159,7 @@ pub struct RunResult {
     /// In order of steps; none in rows of the program's earlier revisions.
     pub answered: Vec<SessionClosed>,
     /// How it ended.
-    pub end: RunRow,
+    pub end: FinishedRow,
 }
 
 impl Results {

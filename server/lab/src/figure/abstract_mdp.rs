@@ -3,7 +3,7 @@
 use domain::agreement::mean;
 
 use super::plot::{Entry, Frame, Labels, Panel, Pen, Scale, Sheet, Svg, series};
-use super::seeds::{BAND, Between, Curve, draw_seeds, in_order_of_appearance};
+use super::seeds::{Between, Curve, draw_seeds, in_order_of_appearance, note};
 use super::{FigureEntry, FigureError, Request, read_rows};
 use crate::experiment::abstract_mdp::{Outcome, Selection, over_seeds};
 
@@ -44,7 +44,7 @@ fn make(request: &Request) -> Result<String, FigureError> {
         })
         .collect();
     let n_above = biases.len().next_multiple_of(3);
-    let sheet = Sheet::new(n_above + ERRORS.len(), 3, (250.0, 160.0), key).noted(BAND);
+    let sheet = Sheet::new(n_above + ERRORS.len(), 3, (250.0, 160.0), key).noted(&note("mean"));
     let mut svg = sheet.start();
     for (n, &bias) in biases.iter().enumerate() {
         let groups: Vec<Vec<Curve>> = selections

@@ -4,21 +4,18 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::plot::N_COLORS;
 use super::seeds::{
-    Between, Curve, SeedSheet, add_line, drawn_lines, in_order_of_appearance, quoted,
+    Between, Bundle, Curve, SeedSheet, Shown, add_line, apart, drawn_lines, in_order_of_appearance,
+    is_by_setting, line_name, quoted, seeds_in_words,
 };
-use super::{
-    Center, CurveRow, FigureEntry, FigureError, Request, choose, make_center, read_rows,
-    shown_method,
-};
+use super::{Center, CurveRow, FigureEntry, FigureError, Request, choose, make_center, read_rows};
 use crate::experiment::grid::shown_setting;
-use crate::method::METHODS;
+use crate::method::rank;
 
 pub(super) const ENTRY: FigureEntry = FigureEntry {
     name: "curves",
     summary: "learning curves by task and method, every seed thin behind their mean",
-    input: "task, method, seed, setting, teacher, step, labels, success_rate, return_mean, wall_s; or the folders of runs",
+    input: "task, method, seed, setting, teacher, step, labels, budget, success_rate, return_mean, wall_s; or the folders of runs",
     choices: &["x", "y", "center"],
     make,
 };
@@ -27,13 +24,6 @@ type Column = fn(&CurveRow) -> f64;
 
 /// Method and setting: what shares a line. No setting where panels tell it.
 type Group = (String, Option<String>);
-
-/// What a panel shows: a task, in one setting or in all.
-#[derive(PartialEq)]
-struct Shown {
-    task: String,
-    setting: Option<String>,
-}
 
 /// What the axes show.
 #[derive(Clone, Copy)]
@@ -47,6 +37,7 @@ struct Axes {
 struct Plan {
     axes: Axes,
     center: Center,
+    center_name: &'static str,
     between: Between,
     rows: Vec<CurveRow>,
     panels: Vec<Shown>,
@@ -57,10 +48,17 @@ impl Plan {
     fn of(request: &Request) -> Result<Self, FigureError> {
         let steps: (&str, Column) = ("Environment steps", |row| row.step as f64);
         let labels: (&str, Column) = ("Labels", |row| f64::from(row.labels));
+        let budget: (&str, Column) = ("Budget (labels)", |row| {
+            row.budget.map_or(f64::NAN, f64::from) // every row has one, or there is no figure
+        });
         let success: (&str, Column) = ("Success (%)", |row| 100.0 * row.success_rate);
         let returns: (&str, Column) = ("Return", |row| row.return_mean);
         let axes = Axes {
-            x: choose("x", request.x, &[("step", steps), ("labels", labels)])?,
+            x: choose(
+                "x",
+                request.x,
+                &[("step", steps), ("labels", labels), ("budget", budget)],
+            )?,
             y: choose(
                 "y",
                 request.y,
@@ -73,9 +71,20 @@ impl Plan {
         for row in &mut rows {
             row.setting = shown_setting(&row.setting, &row.teacher);
         }
+        let without = rows.iter().find(|row| row.budget.is_none());
+        if let Some(row) = without.filter(|_| request.x == Some("budget")) {
+            return Err(FigureError::Misfit(format!(
+                "step {} of {} with {}, seed {}, tells no budget",
+                row.step, row.task, row.method, row.seed
+            )));
+        }
         Ok(Self {
             axes,
             center,
+            center_name: match request.center {
+                Some("iqm") => "interquartile mean",
+                _ => "mean",
+            },
             between: request.between,
             panels: panels(&rows),
             groups: groups(&rows),
@@ -85,57 +94,25 @@ impl Plan {
 
     /// The curves of each group in a panel, each with its seed.
     fn curves(&self, panel: &Shown) -> Result<Vec<Vec<(u64, Curve)>>, FigureError> {
-        let rows: Vec<&CurveRow> = self.rows.iter().filter(|row| panel.shows(row)).collect();
+        let rows = self.rows.iter();
+        let rows: Vec<&CurveRow> = rows.filter(|row| is_shown(row, panel)).collect();
         let of_group = |group| curves(&rows, group, self.axes);
         self.groups.iter().map(of_group).collect()
     }
 
-    /// A panel, or, with more groups than colours, one for each group beside the first.
-    fn apart(&self, title: &str, groups: Vec<Vec<Curve>>) -> Vec<(String, Vec<Vec<Curve>>)> {
-        let there = (1..groups.len()).filter(|n| !groups[*n].is_empty());
-        let there: Vec<usize> = there.collect();
-        if there.len() < N_COLORS {
-            return vec![(title.to_owned(), groups)];
-        }
-        let beside_first = |n: usize| {
-            let alone = (0..groups.len()).map(|k| {
-                let is_shown = k == 0 || k == n;
-                if is_shown {
-                    groups[k].clone()
-                } else {
-                    Vec::new()
-                }
-            });
-            let (method, setting) = &self.groups[n];
-            let name = match setting.as_deref().unwrap_or_default() {
-                "" => shown_method(method),
-                setting => format!("{}, {setting}", shown_method(method)),
-            };
-            (format!("{title}: {name}"), alone.collect())
+    /// Each line by itself.
+    fn bundles(&self) -> Vec<Bundle> {
+        let bundle = |(n, (method, setting)): (usize, &Group)| Bundle {
+            name: line_name(method, setting.as_deref().unwrap_or_default()),
+            lines: vec![n],
         };
-        there.into_iter().map(beside_first).collect()
-    }
-
-    /// Over a panel: its task, and the setting where the task has several.
-    fn title(&self, panel: &Shown) -> String {
-        let is_of_task = |other: &&Shown| other.task == panel.task;
-        let n = self.panels.iter().filter(is_of_task).count();
-        match panel
-            .setting
-            .as_deref()
-            .filter(|setting| n > 1 && !setting.is_empty())
-        {
-            Some(setting) => format!("{}, {setting}", panel.task),
-            None => panel.task.clone(),
-        }
+        self.groups.iter().enumerate().map(bundle).collect()
     }
 }
 
-impl Shown {
-    fn shows(&self, row: &CurveRow) -> bool {
-        let is_setting = |setting: &String| *setting == row.setting;
-        row.task == self.task && self.setting.as_ref().is_none_or(is_setting)
-    }
+fn is_shown(row: &CurveRow, panel: &Shown) -> bool {
+    let is_setting = |setting: &String| *setting == row.setting;
+    row.task == panel.task && panel.setting.as_ref().is_none_or(is_setting)
 }
 
 fn make(request: &Request) -> Result<String, FigureError> {
@@ -148,15 +125,17 @@ fn make(request: &Request) -> Result<String, FigureError> {
         y: axes.y.0,
         is_rate: axes.is_rate,
         center: plan.center,
+        center_name: plan.center_name,
         between: plan.between,
     };
+    let bundles = plan.bundles();
     let panel = |shown: &Shown| {
         let alone = |(_, curve)| curve;
         let groups = plan.curves(shown)?.into_iter();
         let groups: Vec<Vec<Curve>> = groups
             .map(|seeds| seeds.into_iter().map(alone).collect())
             .collect();
-        Ok(plan.apart(&plan.title(shown), groups))
+        Ok(apart(&shown.title(&plan.panels), groups, &bundles))
     };
     let panels = plan.panels.iter().map(panel);
     let panels = panels.collect::<Result<Vec<_>, FigureError>>()?.concat();
@@ -226,10 +205,9 @@ fn curves(rows: &[&CurveRow], group: &Group, axes: Axes) -> Result<Vec<(u64, Cur
     Ok(curves.collect())
 }
 
-/// Each task, or each task in each setting where lines of several methods in several settings
-/// would lie over each other.
+/// Each task, or each task in each setting.
 fn panels(rows: &[CurveRow]) -> Vec<Shown> {
-    let is_split = has_panels_of_settings(rows);
+    let is_split = is_split(rows);
     let shown = rows.iter().map(|row| Shown {
         task: row.task.clone(),
         setting: is_split.then(|| row.setting.clone()),
@@ -237,30 +215,23 @@ fn panels(rows: &[CurveRow]) -> Vec<Shown> {
     in_order_of_appearance(shown)
 }
 
-/// Whether on any task two settings or more are there with two methods or more.
-fn has_panels_of_settings(rows: &[CurveRow]) -> bool {
-    let mut methods: BTreeMap<(&str, &str), BTreeSet<&str>> = BTreeMap::new();
-    for row in rows {
-        let of_setting = methods.entry((&row.task, &row.setting)).or_default();
-        of_setting.insert(&row.method);
-    }
-    let with_several = |task: &str| {
-        let of_task = methods.iter().filter(|((of, _), _)| *of == task);
-        of_task.filter(|(_, methods)| methods.len() > 1).count()
-    };
-    methods.keys().any(|(task, _)| with_several(task) > 1)
+/// Whether each setting has panels of its own.
+fn is_split(rows: &[CurveRow]) -> bool {
+    is_by_setting(rows.iter().map(|row| {
+        let (task, method) = (row.task.as_str(), row.method.as_str());
+        (task, method, row.setting.as_str())
+    }))
 }
 
 /// Methods in the registry's order, others after them; settings in order of appearance.
 fn groups(rows: &[CurveRow]) -> Vec<Group> {
-    let is_split = has_panels_of_settings(rows);
+    let is_split = is_split(rows);
     let all = rows.iter().map(|row| {
         let setting = (!is_split).then(|| row.setting.clone());
         (row.method.clone(), setting)
     });
     let mut groups = in_order_of_appearance(all);
-    let rank = |method: &str| METHODS.iter().position(|m| m.name == method);
-    groups.sort_by_key(|(method, _)| rank(method).unwrap_or(METHODS.len()));
+    groups.sort_by_key(|(method, _)| rank(method));
     groups
 }
 
@@ -278,18 +249,9 @@ fn key_name(group: &Group, rows: &[CurveRow]) -> String {
         let of_curve = seeds.entry((&row.task, &row.setting)).or_default();
         of_curve.insert(row.seed);
     }
-    let least = seeds.values().map(BTreeSet::len).min().unwrap_or(0);
-    let most = seeds.values().map(BTreeSet::len).max().unwrap_or(0);
-    let n_seeds = match (least, most) {
-        (1, 1) => "1 seed".to_owned(),
-        (least, most) if least == most => format!("{most} seeds"),
-        (least, most) => format!("{least}–{most} seeds"),
-    };
-    let method = shown_method(&group.0);
-    match group.1.as_deref().unwrap_or_default() {
-        "" => format!("{method} ({n_seeds})"),
-        setting => format!("{method}, {setting} ({n_seeds})"),
-    }
+    let name = line_name(&group.0, group.1.as_deref().unwrap_or_default());
+    let n_seeds = seeds_in_words(seeds.values().map(BTreeSet::len));
+    format!("{name} ({n_seeds})")
 }
 
 #[cfg(test)]
@@ -422,6 +384,47 @@ mod tests {
             draw(String::new()),
             Err(FigureError::NoRows { .. })
         ));
+    }
+
+    #[test]
+    fn the_note_tells_what_the_thick_line_is() {
+        let sources = [Source {
+            name: "rows.jsonl".into(),
+            text: row("stair", 1, 0, 0.5),
+        }];
+        for (center, told) in [
+            (None, "Thick: mean."),
+            (Some("mean"), "Thick: mean."),
+            (Some("iqm"), "Thick: interquartile mean."),
+        ] {
+            let request = Request {
+                sources: &sources,
+                center,
+                ..Request::default()
+            };
+            let svg = crate::figure::make(&ENTRY, &request).unwrap();
+            assert!(svg.contains(told), "{told} is not in: {svg}");
+        }
+    }
+
+    #[test]
+    fn a_budget_is_not_what_was_answered_so_far() {
+        let draw = |text: String| {
+            let sources = [Source {
+                name: "rows.jsonl".into(),
+                text,
+            }];
+            let request = Request {
+                sources: &sources,
+                x: Some("budget"),
+                ..Request::default()
+            };
+            make(&request)
+        };
+        let told = draw(row("stair", 1, 0, 0.5)).unwrap_err().to_string();
+        assert!(told.contains("tells no budget"), "{told}");
+        let with = row("stair", 1, 0, 0.5).replace("\"labels\"", "\"budget\":80,\"labels\"");
+        assert!(draw(with).unwrap().contains("Budget (labels)"));
     }
 
     #[test]

@@ -25,6 +25,9 @@ pub struct CurveRow {
     pub step: u64,
     /// Answers so far, skips not counted.
     pub labels: u32,
+    /// Answers that the run might have used, where that is told.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub budget: Option<u32>,
     /// Share of evaluation episodes with success, [0, 1].
     pub success_rate: f64,
     /// Mean task return of the evaluation episodes.
@@ -62,6 +65,7 @@ pub fn rows_of_run(config: &RunConfig, name: &str, metrics: &str) -> Result<Stri
             teacher: String::new(),
             step: evaluation.step,
             labels: evaluation.labels,
+            budget: None,
             success_rate: evaluation.success_rate,
             return_mean: evaluation.return_mean,
             wall_s: None,

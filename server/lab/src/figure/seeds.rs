@@ -4,12 +4,19 @@ use domain::agreement::Bootstrap;
 
 use super::plot::{Entry, Labels, Panel, Pen, Scale, Sheet, Svg, series};
 
+mod panels;
+
+pub(super) use panels::{Bundle, Shown, apart, is_by_setting, line_name, seeds_in_words};
+
 /// Points from left to right.
 pub(super) type Curve = Vec<(f64, f64)>;
 
-/// What the lines and areas of [`draw_seeds`] are.
-pub(super) const BAND: &str =
-    "Thin: each seed. Band: 95 % bootstrap interval over seeds, from three seeds on.";
+/// What the lines and areas of [`draw_seeds`] are, with the centre's name.
+pub(super) fn note(center: &str) -> String {
+    format!(
+        "Thick: {center}. Thin: each seed. Band: 95 % bootstrap interval over seeds, from three seeds on."
+    )
+}
 
 /// Fewer seeds have no interval worth telling.
 pub(crate) const LEAST_FOR_INTERVAL: usize = 3;
@@ -36,6 +43,8 @@ pub(super) struct SeedSheet<'a> {
     pub(super) is_rate: bool,
     /// How several seeds become one line.
     pub(super) center: fn(&[f64]) -> f64,
+    /// What that is called.
+    pub(super) center_name: &'a str,
     /// What a seed counts for between two of its points.
     pub(super) between: Between,
 }
@@ -54,7 +63,7 @@ impl SeedSheet<'_> {
         } else {
             (270.0, 180.0)
         };
-        let sheet = Sheet::new(panels.len(), 3, size, key).noted(BAND);
+        let sheet = Sheet::new(panels.len(), 3, size, key).noted(&note(self.center_name));
         let mut svg = sheet.start();
         for (n, (title, curves)) in panels.iter().enumerate() {
             let points = || curves.iter().flatten().flatten();

@@ -109,24 +109,20 @@ impl Run {
             return;
         }
         self.last_activity = Some(activity);
-        let (feedback, n_sessions) = (&self.config.feedback, self.progress.n_sessions);
-        let from_step = n_sessions
-            .checked_sub(1)
-            .map_or(0, |last| feedback.step_of(last));
-        let next = feedback.step_of(n_sessions);
-        let asks_again = self.method.sampler.is_some()
-            && self.has_budget()
-            && next < self.config.training.total_steps;
-        let until = if asks_again {
-            next
-        } else {
-            self.config.training.total_steps
+        let planned = |n: u32| {
+            n.checked_sub(1)
+                .map(|last| self.config.feedback.step_of(last))
         };
+        let began_at = self.progress.asked_at;
+        let from_step = began_at.or_else(|| planned(self.progress.n_sessions)); // older checkpoints
+        let until = self
+            .next_session_at()
+            .unwrap_or(self.config.training.total_steps);
         events(Event::Phase(Phase {
             activity,
             step: self.progress.step,
             total_steps: self.config.training.total_steps,
-            from_step,
+            from_step: from_step.unwrap_or(0),
             until_step: matches!(activity, Activity::Exploring | Activity::Learning)
                 .then_some(until),
             session_answers: self.session.as_ref().map(|s| s.progress(&self.preferences)),

@@ -265,7 +265,7 @@ fn steps_of_the_temporal_distance_and_its_blocks_are_set_apart() {
 fn surf_adds_pairs_that_nobody_was_asked_about_for_every_query() {
     for (method, per_query) in [("surf", 10), ("surf_whole", 10), ("pebble", 0)] {
         let trained = Trained::new(method, &[]);
-        assert_eq!(trained.run.unlabeled(1).len(), per_query * 4, "{method}");
+        assert_eq!(trained.run.unlabeled(1, 1).len(), per_query * 4, "{method}");
     }
 }
 

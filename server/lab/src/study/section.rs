@@ -4,10 +4,9 @@ use std::cell::RefCell;
 use std::fmt;
 use std::ops::RangeInclusive;
 
+use domain::nearest::nearest;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
-
-use crate::nearest::nearest;
 
 /// Something in a file that does not fit.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]

@@ -8,8 +8,9 @@ use domain::environment::TaskReward;
 use serde::{Deserialize, Serialize};
 
 use super::{NO_STAGE, NewStep, Replay, ReplayShape, StepMark, row};
-use crate::checkpoint::{numbers, write_durably};
+use crate::checkpoint::numbers;
 use crate::checksum::Checksum;
+use crate::durable;
 use crate::error::LearnError;
 
 const JOURNAL: &str = "journal";
@@ -100,7 +101,9 @@ impl Replay {
         self.journal.written = written;
 
         let number = self.journal.n_columns + 1;
-        write_durably(&column_path(folder, number), &self.column_bytes())?;
+        let path = column_path(folder, number);
+        durable::replace(&path, &self.column_bytes())
+            .map_err(|e| LearnError::file("write", &path, e))?;
         self.journal.n_columns = number;
         Ok(ReplayMark {
             journal_len: self.journal.len,

@@ -13,7 +13,9 @@ use crate::sac::{FirstSteps, Sac};
 pub struct SteeringConfig {
     /// Environment steps between two outer steps, N. 10,000 for door-open, which we take for all
     /// MetaWorld tasks without a value of their own; the paper lists 5,000 for hammer,
-    /// button-press and cheetah, 3,000 for quadruped, 1,000 for walker.
+    /// button-press and cheetah, 3,000 for quadruped, 1,000 for walker. An outer step takes the
+    /// place of one of SAC's; where none is due at that control step (fewer than one update for all
+    /// environments, `training.updates_per_step`), it is one more.
     pub every: u64,
     /// What the critics' disagreement with the answers counts.
     pub weight: f64,

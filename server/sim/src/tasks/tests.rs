@@ -390,7 +390,11 @@ fn task_names_differ_and_lead_to_their_tasks() {
 #[test]
 fn an_unknown_task_is_answered_with_the_nearest_one_and_the_list() {
     let error = task("go-fetch-retrun").expect_err("misspelled");
-    assert_eq!(error.nearest, "go-fetch-return");
+    assert_eq!(error.nearest, Some("go-fetch-return"));
+    assert!(error.to_string().contains("did you mean"), "{error}");
+    let nonsense = task("zzzzzz").expect_err("no name is like it");
+    assert_eq!(nonsense.nearest, None);
+    assert!(!nonsense.to_string().contains("did you mean"), "{nonsense}");
     for known in tasks() {
         assert!(error.to_string().contains(known.name), "{error}");
     }

@@ -19,6 +19,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
 use indicatif::{ProgressBar, ProgressStyle};
+use lab::cost::on_cores;
 use lab::experiment::grid::GridRun;
 use lab::experiment::results::{GridFolder, Results, Row, rows_of_run};
 use lab::history::RunHistory;
@@ -34,6 +35,8 @@ const N_THREADS: &str = "RAYON_NUM_THREADS";
 const LOOK: Duration = Duration::from_millis(100);
 /// Between looks at how far they are.
 const LOOK_CLOSELY: Duration = Duration::from_secs(3);
+/// After which what is done tells how fast this goes.
+const SETTLED: Duration = Duration::from_secs(10);
 
 /// What became of the runs.
 #[derive(Debug, Default)]
@@ -259,8 +262,11 @@ struct Progress<'a> {
     jobs: usize,
     began: Instant,
     looked: Option<Instant>,
-    /// Seconds on one core that were left at first.
+    /// Seconds on one core that were left at first, as estimated.
     at_first: f64,
+    /// Seconds that runs have been up, added up until the last look at the processes.
+    busy_s: f64,
+    counted: Instant,
 }
 
 impl<'a> Progress<'a> {
@@ -274,14 +280,17 @@ impl<'a> Progress<'a> {
         let style = ProgressStyle::with_template("{bar:30} {pos}/{len} runs  {msg}");
         bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
         let left = waiting.iter().map(|run| left_s(folder, run)).sum();
+        let now = Instant::now();
         Self {
             folder,
             bar,
             n_runs,
             jobs,
-            began: Instant::now(),
+            began: now,
             looked: None,
             at_first: left,
+            busy_s: 0.0,
+            counted: now,
         }
     }
 
@@ -305,6 +314,7 @@ impl<'a> Progress<'a> {
         waiting: &VecDeque<&GridRun>,
         up: &[Worker],
     ) -> anyhow::Result<()> {
+        self.count(up.len());
         let n_over = tally.n_before + tally.n_finished + tally.failed.len();
         let is_end = up.is_empty() && waiting.is_empty();
         let is_soon = self.looked.is_some_and(|at| at.elapsed() < LOOK_CLOSELY);
@@ -312,21 +322,10 @@ impl<'a> Progress<'a> {
             return Ok(());
         }
         self.looked = Some(Instant::now());
-        let runs = || {
-            waiting
-                .iter()
-                .copied()
-                .chain(up.iter().map(|worker| worker.run))
-        };
-        let left = runs().map(|run| left_s(self.folder, run)).sum::<f64>();
-        let (done, elapsed) = (self.at_first - left, self.began.elapsed().as_secs_f64());
-        // The estimate of the whole is scaled by how fast its first part went.
-        let speed = if done > 0.0 && elapsed > 10.0 {
-            done / elapsed
-        } else {
-            self.jobs as f64
-        };
-        let left = left / speed;
+        let runs = up.iter().map(|worker| worker.run);
+        let runs = runs.chain(waiting.iter().copied());
+        let lefts: Vec<f64> = runs.map(|run| left_s(self.folder, run)).collect();
+        let left = time_left(&lefts, self.jobs, self.pace(lefts.iter().sum()));
         self.bar.set_position(n_over as u64);
         let words = in_words(Duration::from_secs_f64(left.clamp(0.0, 1e9)));
         self.bar.set_message(format!(
@@ -347,6 +346,35 @@ impl<'a> Progress<'a> {
         });
         Ok(self.folder.replace("progress.json", &text.to_string())?)
     }
+
+    /// Adds what the runs that are up have taken since the last time.
+    fn count(&mut self, n_up: usize) {
+        let now = Instant::now();
+        self.busy_s += now.duration_since(self.counted).as_secs_f64() * n_up as f64;
+        self.counted = now;
+    }
+
+    /// Seconds that each estimated second took so far.
+    ///
+    /// * `left` – seconds on one core that are still estimated
+    fn pace(&self, left: f64) -> f64 {
+        let done = self.at_first - left;
+        if done > 0.0 && self.began.elapsed() > SETTLED {
+            self.busy_s / done
+        } else {
+            1.0
+        }
+    }
+}
+
+/// Seconds until the last run is over: a run is on one core, so the cores that the others leave do
+/// not help it.
+///
+/// * `lefts` – estimated seconds of each run, in the order in which they are started
+/// * `pace` – seconds that an estimated one takes
+fn time_left(lefts: &[f64], n_jobs: usize, pace: f64) -> f64 {
+    let estimated = lefts.iter().map(|left| Duration::from_secs_f64(*left));
+    pace * on_cores(estimated, n_jobs).as_secs_f64()
 }
 
 fn step(folder: &GridFolder, run: &GridRun) -> u64 {
@@ -369,6 +397,36 @@ mod tests {
         std::fs::write(folder.path().join("log.txt"), log).unwrap();
         std::fs::write(folder.path().join("metrics.jsonl"), metrics).unwrap();
         end(folder.path(), ExitStatus::from_raw(status))
+    }
+
+    #[test]
+    fn the_last_run_takes_its_time_however_many_cores_are_free() {
+        let close = |found: f64, expected: f64| {
+            assert!((found - expected).abs() < 1e-6, "{found} for {expected}");
+        };
+        close(time_left(&[100.0, 10.0], 2, 1.0), 100.0);
+        close(time_left(&[100.0, 10.0, 5.0], 2, 1.5), 150.0);
+        close(time_left(&[30.0; 4], 2, 1.0), 60.0);
+        close(time_left(&[], 2, 1.0), 0.0);
+    }
+
+    #[test]
+    fn the_pace_is_that_of_runs_that_were_up_and_not_of_idle_cores() {
+        let folder = GridFolder::at(Path::new("nowhere"));
+        let mut progress = Progress::new(&folder, 2, 4, &VecDeque::new());
+        progress.at_first = 100.0;
+        progress.busy_s = 60.0;
+        assert_eq!(
+            progress.pace(60.0).to_bits(),
+            1.0_f64.to_bits(),
+            "too early"
+        );
+        let Some(earlier) = progress.began.checked_sub(2 * SETTLED) else {
+            return; // the machine has only just started
+        };
+        progress.began = earlier;
+        // 40 estimated seconds took 60, of one run beside three idle cores.
+        assert!((progress.pace(60.0) - 1.5).abs() < 1e-12);
     }
 
     #[test]

@@ -67,7 +67,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     folder
         .check(&chosen.grid.runs, &results, revision)
         .map_err(BadInput::from_error)?;
-    folder.keep_file(&chosen.text)?;
+    folder.keep_file(&chosen.text, args.small)?;
 
     let is_told = Arc::new(AtomicBool::new(false));
     let hears = Arc::clone(&is_told);

@@ -1,7 +1,7 @@
 //! Runs that stand in one line of a table.
 
 use super::{RunKey, RunResult, Runs};
-use crate::method::METHODS;
+use crate::method::rank;
 
 /// Runs of one method in one setting under one teacher on one task.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -18,6 +18,14 @@ impl Group {
             task: key.task.clone(),
             method: key.method.clone(),
             setting: key.shown_setting(),
+        }
+    }
+
+    /// `stair (80 answers)`
+    pub(super) fn named(&self) -> String {
+        match self.setting.as_str() {
+            "" => self.method.clone(),
+            setting => format!("{} ({setting})", self.method),
         }
     }
 }
@@ -39,13 +47,11 @@ pub(super) fn groups(runs: &Runs) -> Vec<Group> {
         }
     }
     let place = |list: &[String], name: &str| list.iter().position(|known| known == name);
-    let rank = |method: &str| METHODS.iter().position(|m| m.name == method);
     groups.sort_by_key(|group| {
-        let method = rank(&group.method).unwrap_or(METHODS.len());
         (
             place(&tasks, &group.task),
             place(&settings, &group.setting),
-            method,
+            rank(&group.method),
         )
     });
     groups

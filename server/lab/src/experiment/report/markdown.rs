@@ -2,7 +2,9 @@
 
 use domain::agreement::{Bootstrap, interquartile_mean, mean};
 
+use super::budgets::Budgets;
 use super::comparable::{counted, revisions};
+use super::differences::differences;
 use super::group::{Group, groups, members};
 use super::numbers::{SHARES, add, center, estimate, number, told_of};
 use super::score::{
@@ -10,27 +12,27 @@ use super::score::{
     same_stage_pool, score, symmetric_gap_auc,
 };
 use super::{RunResult, Runs};
-
-/// Pairs of seeds from which on a difference may be called one. With fewer, differences of pure
-/// chance have one sign in more than one case of twenty (2 · ½ⁿ), and an interval drawn from
-/// them leaves 0 out then.
-const LEAST_TO_BE_SURE: usize = 6;
+use crate::words::thousands;
 
 /// The whole report as Markdown.
 pub(super) fn report(runs: &Runs) -> String {
     let mut text = String::from(
         "# Report\n\nA run's score is the mean of its last ten evaluations, each of the same held-out episodes. \
+         Steps: environment steps of training. \
          Over seeds: interquartile mean, from three seeds on with its 95 % bootstrap interval. Area: mean height of the curve. \
          Intervals over few seeds are narrower than they say: of five they hold the truth in 84 of 100 cases. \
-         Reached: the first evaluation with that success, median over seeds; one that never got there comes after all that did.\n",
+         Reached: the first evaluation with that success, median over seeds, the later of two in the middle; \
+         one that never got there comes after all that did.\n",
     );
     let groups = groups(runs);
+    let left_out = Budgets::of(&runs.runs.iter().collect::<Vec<_>>()).left_out;
     let mut tasks: Vec<&str> = groups.iter().map(|group| group.task.as_str()).collect();
     tasks.dedup();
     for task in tasks {
         let of_task: Vec<&Group> = groups.iter().filter(|group| group.task == task).collect();
         add(&mut text, format!("\n## {task}\n"));
         scores(&mut text, runs, &of_task);
+        left_out_by_budget(&mut text, &left_out, task);
         differences(&mut text, runs, &of_task);
         learning(&mut text, runs, &of_task);
         alignment(&mut text, runs, &of_task);
@@ -44,15 +46,19 @@ pub(super) fn report(runs: &Runs) -> String {
 
 fn scores(text: &mut String, runs: &Runs, groups: &[&Group]) {
     text.push_str(
-        "\n| method | setting | seeds | score | by seed | area | labels (steps) to 50 % | to 80 % | to 95 % |\n\
-         |---|---|---:|---|---|---|---|---|---|\n",
+        "\n| method | setting | steps | seeds | score | by seed | area | labels (steps) to 50 % | to 80 % | to 95 % |\n\
+         |---|---|---:|---:|---|---|---|---|---|---|\n",
     );
     for group in groups {
         let members = members(runs, group);
         let of = |f: fn(&RunResult) -> f64| members.iter().map(|run| f(run)).collect::<Vec<_>>();
         let is_rate = members.iter().all(|run| run.end.has_success);
         let scores = of(|run| score(run).value);
-        let by_seed: Vec<String> = scores.iter().map(|s| number(*s, is_rate)).collect();
+        let of_seed = |(run, value): (&&RunResult, &f64)| {
+            format!("{}: {}", run.key.seed, number(*value, is_rate))
+        };
+        let by_seed: Vec<String> = members.iter().zip(&scores).map(of_seed).collect();
+        let steps = members.first().map_or(0, |run| run.end.total_steps); // all alike in a setting
         let fewest = members.iter().map(|run| score(run).n_evaluations).min();
         let note = match fewest {
             Some(n) if n < 10 => format!(" (last {n})"),
@@ -61,9 +67,10 @@ fn scores(text: &mut String, runs: &Runs, groups: &[&Group]) {
         add(
             text,
             format!(
-                "| {} | {} | {} | {}{note} | {} | {} |",
+                "| {} | {} | {} | {} | {}{note} | {} | {} |",
                 group.method,
                 or_dash(&group.setting),
+                thousands(steps),
                 members.len(),
                 center(&scores, is_rate),
                 by_seed.join(", "),
@@ -82,7 +89,23 @@ fn scores(text: &mut String, runs: &Runs, groups: &[&Group]) {
     }
 }
 
-/// `24 (12000), 4 of 5 seeds`; the lower of two in the middle.
+/// Settings of a task that the figure by budget has no place for.
+fn left_out_by_budget(text: &mut String, left_out: &[Group], task: &str) {
+    let of_task = left_out.iter().filter(|group| group.task == task);
+    let names: Vec<String> = of_task.map(Group::named).collect();
+    if names.is_empty() {
+        return;
+    }
+    add(
+        text,
+        format!(
+            "\nLeft out of the figure by budget, which takes methods with several budgets and one setting for each: {}.\n",
+            names.join(", ")
+        ),
+    );
+}
+
+/// `24 (12000), 4 of 5 seeds`; the later of two in the middle.
 fn told(when: &[Option<Reached>]) -> String {
     let mut there: Vec<Reached> = when.iter().flatten().copied().collect();
     if there.is_empty() {
@@ -94,108 +117,37 @@ fn told(when: &[Option<Reached>]) -> String {
     } else {
         String::new()
     };
-    match there.get((when.len() - 1) / 2) {
+    match there.get(when.len() / 2) {
         Some(middle) => format!("{} ({}){n}", middle.labels, middle.step),
         None => format!("never, but {} of {} seeds", there.len(), when.len()),
     }
-}
-
-/// The first method against every other in the same setting, and every method's first setting
-/// against its others.
-fn differences(text: &mut String, runs: &Runs, groups: &[&Group]) {
-    let mut lines = String::new();
-    for (first, second) in pairs(groups) {
-        let (a, b) = (members(runs, first), members(runs, second));
-        let paired: Vec<(&RunResult, &RunResult)> = a
-            .iter()
-            .filter_map(|run| {
-                let other = b.iter().find(|other| other.key.seed == run.key.seed)?;
-                Some((*run, *other))
-            })
-            .collect();
-        let is_rate = a.iter().all(|run| run.end.has_success);
-        let of = |f: &dyn Fn(&RunResult) -> f64| {
-            let pairs: Vec<(f64, f64)> = paired.iter().map(|(a, b)| (f(a), f(b))).collect();
-            difference(&pairs, is_rate)
-        };
-        let stage: Vec<(f64, f64)> = paired
-            .iter()
-            .filter_map(|(a, b)| Some((same_stage(a)?, same_stage(b)?)))
-            .collect();
-        let named = |group: &Group| match group.setting.as_str() {
-            "" => group.method.clone(),
-            setting => format!("{} ({setting})", group.method),
-        };
-        add(
-            &mut lines,
-            format!(
-                "| {} − {} | {} | {} | {} | {} |\n",
-                named(first),
-                named(second),
-                paired.len(),
-                of(&|run| score(run).value),
-                of(&area),
-                difference(&stage, true)
-            ),
-        );
-    }
-    if !lines.is_empty() {
-        text.push_str(
-            "\nDifferences between runs of the same seed, mean with its 95 % bootstrap interval; bold where it excludes 0 and there are six seeds or more, as fewer agree by chance too often:\n\n\
-             | difference | seeds | of scores | of areas | of pairs in one true stage |\n|---|---:|---|---|---|\n",
-        );
-        text.push_str(&lines);
-    }
-}
-
-fn pairs<'a>(groups: &[&'a Group]) -> Vec<(&'a Group, &'a Group)> {
-    // In a setting its first method against every other, then of a method its first setting
-    // against every other.
-    let of_setting = |a: &Group, b: &Group| a.setting == b.setting;
-    let of_method = |a: &Group, b: &Group| a.method == b.method;
-    let mut pairs = Vec::new();
-    for are_alike in [of_setting, of_method] {
-        for (n, group) in groups.iter().enumerate() {
-            let first = groups.iter().position(|other| are_alike(other, group));
-            pairs.extend(
-                first
-                    .filter(|first| *first < n)
-                    .map(|first| (groups[first], *group)),
-            );
-        }
-    }
-    pairs
-}
-
-fn difference(pairs: &[(f64, f64)], is_rate: bool) -> String {
-    Bootstrap::default().paired_difference(pairs).map_or_else(
-        || "–".into(),
-        |found| {
-            let told = told_of(pairs.len(), &found, is_rate);
-            let is_sure = pairs.len() >= LEAST_TO_BE_SURE && !found.interval.contains(0.0);
-            if is_sure { format!("**{told}**") } else { told }
-        },
-    )
 }
 
 /// Whether anything was learned at all.
 fn learning(text: &mut String, runs: &Runs, groups: &[&Group]) {
     let mut lines = String::new();
     for group in groups {
-        let found: Vec<Learned> = members(runs, group)
+        let found: Vec<(u64, Learned)> = members(runs, group)
             .into_iter()
-            .filter_map(learned)
+            .filter_map(|run| Some((run.key.seed, learned(run)?)))
             .collect();
         if found.is_empty() {
             continue;
         }
-        let of = |f: fn(&Learned) -> f64| mean(&found.iter().map(f).collect::<Vec<_>>());
+        let of = |f: fn(&Learned) -> f64| {
+            let values = found.iter().map(|(_, learned)| f(learned));
+            mean(&values.collect::<Vec<_>>())
+        };
         let by_seed: Vec<String> = found
             .iter()
-            .map(|learned| {
+            .map(|(seed, learned)| {
                 let told = estimate(&learned.difference, false);
                 let is_sure = !learned.difference.interval.contains(0.0);
-                if is_sure { format!("**{told}**") } else { told }
+                if is_sure {
+                    format!("{seed}: **{told}**")
+                } else {
+                    format!("{seed}: {told}")
+                }
             })
             .collect();
         add(
@@ -204,7 +156,7 @@ fn learning(text: &mut String, runs: &Runs, groups: &[&Group]) {
                 "| {} | {} | {} | {:.0} | {:.0} | {} |\n",
                 group.method,
                 or_dash(&group.setting),
-                found[0].n_episodes,
+                found[0].1.n_episodes,
                 of(|learned| learned.before),
                 of(|learned| learned.after),
                 by_seed.join("; ")
@@ -291,7 +243,8 @@ fn agreement(text: &mut String, runs: &Runs, groups: &[&Group]) {
     }
 }
 
-/// Methods that are there on every task that is solved or not, with as many strata as tasks.
+/// Methods that are there on every task that is solved or not, with as many strata as tasks, all of
+/// the same seeds.
 fn over_all_tasks(text: &mut String, runs: &Runs, groups: &[Group]) {
     let solved = |run: &RunResult| run.end.has_success;
     let mut tasks: Vec<&str> = Vec::new();
@@ -306,13 +259,14 @@ fn over_all_tasks(text: &mut String, runs: &Runs, groups: &[Group]) {
     add(
         text,
         format!(
-            "\n## All {} tasks\n\nSeeds are drawn again within each task (stratified).\n\n\
+            "\n## All {} tasks\n\nOf each method the seeds that it has on every one of these tasks, so that tasks weigh alike; \
+             a dash where it has none. Seeds are drawn again within each task (stratified).\n\n\
              | method | setting | score |\n|---|---|---|\n",
             tasks.len()
         ),
     );
     for group in groups.iter().filter(|group| group.task == tasks[0]) {
-        let strata: Vec<Vec<f64>> = tasks
+        let on_tasks: Vec<Vec<&RunResult>> = tasks
             .iter()
             .map(|task| {
                 let on_task = Group {
@@ -320,17 +274,15 @@ fn over_all_tasks(text: &mut String, runs: &Runs, groups: &[Group]) {
                     ..group.clone()
                 };
                 members(runs, &on_task)
-                    .iter()
-                    .map(|run| score(run).value)
-                    .collect()
             })
             .collect();
-        if strata.iter().any(Vec::is_empty) {
+        if on_tasks.iter().any(Vec::is_empty) {
             continue;
         }
+        let strata = scores_of_common_seeds(&on_tasks);
+        let n_seeds = strata.first().map_or(0, Vec::len);
         let found = Bootstrap::default().stratified(&strata, interquartile_mean);
-        let fewest = strata.iter().map(Vec::len).min().unwrap_or(0);
-        let told = found.map_or_else(|| "–".into(), |found| told_of(fewest, &found, true));
+        let told = found.map_or_else(|| "–".into(), |found| told_of(n_seeds, &found, true));
         add(
             text,
             format!(
@@ -340,6 +292,19 @@ fn over_all_tasks(text: &mut String, runs: &Runs, groups: &[Group]) {
             ),
         );
     }
+}
+
+/// Scores on each task, of the seeds that are there on all of them.
+fn scores_of_common_seeds(on_tasks: &[Vec<&RunResult>]) -> Vec<Vec<f64>> {
+    let is_common = |seed: u64| {
+        let mut tasks = on_tasks.iter();
+        tasks.all(|members| members.iter().any(|run| run.key.seed == seed))
+    };
+    let on_task = |members: &Vec<&RunResult>| {
+        let common = members.iter().filter(|run| is_common(run.key.seed));
+        common.map(|run| score(run).value).collect::<Vec<f64>>()
+    };
+    on_tasks.iter().map(on_task).collect()
 }
 
 fn failures(text: &mut String, runs: &Runs) {

@@ -2,7 +2,7 @@
 
 use super::RowFile;
 use crate::experiment::grid::RunKey;
-use crate::experiment::results::{Content, Results, Row, RunResult, RunRow};
+use crate::experiment::results::{Content, FinishedRow, Results, Row, RunResult};
 use crate::message::{Evaluation, SessionClosed, SessionOffered};
 
 /// A run with these evaluations at every thousandth step, each after ten more answers.
@@ -39,8 +39,8 @@ impl Told {
         }
     }
 
-    pub(super) fn end(&self) -> RunRow {
-        RunRow {
+    pub(super) fn end(&self) -> FinishedRow {
+        FinishedRow {
             total_steps: 3_000,
             labels: 30,
             budget: self.budget,
@@ -56,7 +56,7 @@ impl Told {
         }
     }
 
-    pub(super) fn rows(&self, end: RunRow) -> String {
+    pub(super) fn rows(&self, end: FinishedRow) -> String {
         let mut contents = vec![Content::Session(SessionOffered {
             step: 1_500,
             session: 1,
@@ -106,6 +106,20 @@ impl Told {
 
     pub(super) fn text(&self) -> String {
         self.rows(self.end())
+    }
+
+    /// As a start leaves it that it could not get through.
+    pub(super) fn failed(&self, reason: &str) -> String {
+        let row = Row {
+            key: self.key(),
+            content: Content::Failed {
+                reason: reason.into(),
+                revision: "abc".into(),
+                machine: "two cores".into(),
+                config: toml::Table::new(),
+            },
+        };
+        serde_json::to_string(&row).unwrap() + "\n"
     }
 
     pub(super) fn run(&self) -> RunResult {

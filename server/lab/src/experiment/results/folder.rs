@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! experiment.toml       the file as it was given
+//! variant.txt           `small` or `whole`: which of the file's grids
 //! results.jsonl         rows of the runs that are over
 //! settings/HASH.toml    resolved settings by fingerprint, seeds left out
 //! runs/NAME/            a run: its folder, with history.json, and log.txt
@@ -13,15 +14,22 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
+use learn::durable;
+
 use super::settings::{first_difference, table, without_seed};
 use super::{Content, Results, Row, fingerprint};
 use crate::config::{ConfigError, RunConfig};
 use crate::experiment::grid::{GridRun, RunKey};
 use crate::history::{Provenance, RunHistory};
 
+/// Where it stands which of the file's grids is meant.
+const VARIANT: &str = "variant.txt";
+/// What it says of the small one.
+const SMALL: &str = "small";
+
 /// Why a grid's folder cannot be used.
 #[derive(Debug, thiserror::Error)]
-pub enum StoreError {
+pub enum FolderError {
     /// The disk.
     #[error("cannot {doing} ({path}): {source}")]
     Io {
@@ -91,7 +99,7 @@ impl GridFolder {
     ///
     /// # Errors
     /// When the disk refuses.
-    pub fn create(&self) -> Result<(), StoreError> {
+    pub fn create(&self) -> Result<(), FolderError> {
         for folder in ["runs", "settings"] {
             let path = self.root.join(folder);
             fs::create_dir_all(&path).map_err(refused("make the experiment's folder", &path))?;
@@ -99,12 +107,19 @@ impl GridFolder {
         Ok(())
     }
 
-    /// Keeps the file that it belongs to.
+    /// Keeps the file that it belongs to, and whether its small variant is meant.
     ///
     /// # Errors
     /// When the disk refuses.
-    pub fn keep_file(&self, text: &str) -> Result<(), StoreError> {
-        self.replace("experiment.toml", text)
+    pub fn keep_file(&self, text: &str, is_small: bool) -> Result<(), FolderError> {
+        self.replace("experiment.toml", text)?;
+        self.replace(VARIANT, if is_small { SMALL } else { "whole" })
+    }
+
+    /// Whether it is of the small variant; no folder of the program's earlier revisions says so.
+    pub fn is_small(&self) -> bool {
+        let variant = fs::read_to_string(self.root.join(VARIANT));
+        variant.is_ok_and(|variant| variant.trim() == SMALL)
     }
 
     /// The log, which whoever works on the grid holds locked: a run that was started from here
@@ -112,7 +127,7 @@ impl GridFolder {
     ///
     /// # Errors
     /// When the disk refuses.
-    pub fn log_file(&self) -> Result<File, StoreError> {
+    pub fn log_file(&self) -> Result<File, FolderError> {
         let path = self.root.join("log.jsonl");
         let file = OpenOptions::new().create(true).append(true).open(&path);
         file.map_err(refused("open the experiment's log", &path))
@@ -132,7 +147,7 @@ impl GridFolder {
     ///
     /// # Errors
     /// A file that cannot be read, a line that is no row.
-    pub fn results(&self) -> Result<Results, StoreError> {
+    pub fn results(&self) -> Result<Results, FolderError> {
         let path = self.results_path();
         let text = match read_rows(&path) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => String::new(),
@@ -149,7 +164,7 @@ impl GridFolder {
     ///
     /// # Panics
     /// Never: rows are plain values.
-    pub fn add(&self, rows: &[Row]) -> Result<(), StoreError> {
+    pub fn add(&self, rows: &[Row]) -> Result<(), FolderError> {
         let len = self.results()?.len;
         let path = self.results_path();
         let mut text = String::new();
@@ -175,7 +190,7 @@ impl GridFolder {
         run: &GridRun,
         reason: &str,
         provenance: Provenance,
-    ) -> Result<(), StoreError> {
+    ) -> Result<(), FolderError> {
         self.add(&[Row {
             key: run.key.clone(),
             content: Content::Failed {
@@ -191,7 +206,7 @@ impl GridFolder {
     ///
     /// # Errors
     /// When the disk refuses.
-    pub fn keep_settings(&self, config: &RunConfig) -> Result<PathBuf, StoreError> {
+    pub fn keep_settings(&self, config: &RunConfig) -> Result<PathBuf, FolderError> {
         let name = format!("settings/{}.toml", fingerprint(config));
         self.replace(&name, &without_seed(config).to_toml())?;
         Ok(self.root.join(name))
@@ -207,7 +222,7 @@ impl GridFolder {
         runs: &[GridRun],
         results: &Results,
         revision: Option<&str>,
-    ) -> Result<(), StoreError> {
+    ) -> Result<(), FolderError> {
         for run in runs {
             let Some(there) = self.settings_of(run, results)? else {
                 continue; // as here, or not started
@@ -254,7 +269,7 @@ impl GridFolder {
         &self,
         run: &GridRun,
         results: &Results,
-    ) -> Result<Option<RunConfig>, StoreError> {
+    ) -> Result<Option<RunConfig>, FolderError> {
         let path = match results.run(&run.key) {
             Some(done) if done.end.settings == fingerprint(&run.config) => return Ok(None),
             Some(done) => {
@@ -281,7 +296,7 @@ impl GridFolder {
     ///
     /// # Errors
     /// When the disk refuses.
-    pub fn slim(&self, key: &RunKey) -> Result<(), StoreError> {
+    pub fn slim(&self, key: &RunKey) -> Result<(), FolderError> {
         let root = self.run_path(key);
         let entries = fs::read_dir(&root).map_err(refused("read the run's folder", &root))?;
         for entry in entries.flatten() {
@@ -303,15 +318,9 @@ impl GridFolder {
     ///
     /// # Errors
     /// When the disk refuses.
-    pub fn replace(&self, name: &str, text: &str) -> Result<(), StoreError> {
+    pub fn replace(&self, name: &str, text: &str) -> Result<(), FolderError> {
         let path = self.root.join(name);
-        let draft = path.with_extension("draft");
-        let written = File::create(&draft).and_then(|mut file| {
-            file.write_all(text.as_bytes())?;
-            file.sync_all()?;
-            fs::rename(&draft, &path)
-        });
-        written.map_err(refused("save", &path))
+        durable::replace(&path, text.as_bytes()).map_err(refused("save", &path))
     }
 }
 
@@ -327,8 +336,8 @@ pub fn read_rows(path: &Path) -> io::Result<String> {
     String::from_utf8(bytes).map_err(io::Error::other)
 }
 
-fn refused<'a>(doing: &'static str, path: &'a Path) -> impl FnOnce(io::Error) -> StoreError + 'a {
-    move |source| StoreError::Io {
+fn refused<'a>(doing: &'static str, path: &'a Path) -> impl FnOnce(io::Error) -> FolderError + 'a {
+    move |source| FolderError::Io {
         doing,
         path: path.to_owned(),
         source,

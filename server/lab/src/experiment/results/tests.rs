@@ -129,6 +129,16 @@ fn a_failure_counts_until_the_run_is_finished_after_all() {
 }
 
 #[test]
+fn a_folder_keeps_which_variant_it_is_and_is_whole_where_none_is_told() {
+    let (_place, folder) = Place::new("variant");
+    assert!(!folder.is_small(), "as an earlier revision left it");
+    folder.keep_file("title = \"Labels\"", true).unwrap();
+    assert!(folder.is_small());
+    folder.keep_file("title = \"Labels\"", false).unwrap();
+    assert!(!folder.is_small());
+}
+
+#[test]
 fn a_line_that_is_no_row_and_a_run_that_is_there_twice_are_named() {
     let text: String = rows(1, "abc")
         .iter()
