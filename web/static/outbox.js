@@ -143,6 +143,9 @@ export class Outbox extends EventTarget {
       // One tab sends at a time where the browser can arrange that; otherwise the server sorts it out.
       const send = () => this.#sendInOrder();
       await (navigator.locks ? navigator.locks.request('stair-outbox', send) : send());
+    } catch (reason) {
+      console.error('what is to be sent could not be read:', reason);
+      this.#sendLater();
     } finally {
       this.#sending = false;
       if (this.#isToSendAgain) this.#sendSoon(0);
@@ -167,6 +170,10 @@ export class Outbox extends EventTarget {
 
   #tryAgain(why, count) {
     this.#tell('waiting', { count, why });
+    this.#sendLater();
+  }
+
+  #sendLater() {
     this.#sendSoon(this.#retryMs);
     this.#retryMs = Math.min(LAST_RETRY_MS, this.#retryMs * 2);
   }

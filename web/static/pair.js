@@ -34,11 +34,20 @@ export class StairPair extends HTMLElement {
   #request = 0;
   #drawn = { left: -1, right: -1 };
   #observer = null;
+  #isListening = false;
   /** Ends the loading of own clips; `null` until it begins, and where the page loads the clips. */
   #loading = null;
   #watch = emptyWatch();
 
   connectedCallback() {
+    if (!this.#isListening) this.#listen();
+    document.addEventListener('visibilitychange', this.#visibilityChanged);
+    if (this.hasAttribute('left')) this.#loadWhenSeen();
+  }
+
+  /** To what happens inside it; once, however often it is put on a page. */
+  #listen() {
+    this.#isListening = true;
     this.addEventListener('click', (event) => {
       const what = event.target.closest('[data-do]')?.dataset.do;
       if (event.target.closest('canvas')) this.toggle();
@@ -50,8 +59,6 @@ export class StairPair extends HTMLElement {
     this.addEventListener('pointerdown', ({ target }) => { if (isSlider(target)) this.#isDragged = true; });
     this.addEventListener('focusout', ({ target }) => { if (isSlider(target)) this.#isDragged = false; });
     this.addEventListener('keydown', (event) => this.#stepByArrow(event));
-    document.addEventListener('visibilitychange', this.#visibilityChanged);
-    if (this.hasAttribute('left')) this.#loadWhenSeen();
   }
 
   disconnectedCallback() {

@@ -81,7 +81,7 @@ pub struct Label {
     pub speed: Option<f64>,
     /// Frames not shown in time.
     pub dropped_frames: Option<i64>,
-    /// `key` or `pointer`.
+    /// `key` or `pointer`; `None` where the page itself passed the pair over.
     pub input: Option<String>,
     /// RFC 3339.
     pub stored_at: String,

@@ -224,7 +224,7 @@ pub struct TimingRequest {
     speed: Option<f64>,
     /// Frames that were not shown in time.
     dropped_frames: Option<u32>,
-    /// `key` or `pointer`.
+    /// `key` or `pointer`; null where the page itself passed the pair over.
     input: Option<String>,
 }
 
