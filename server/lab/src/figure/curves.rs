@@ -242,12 +242,12 @@ fn is_in(row: &CurveRow, (method, setting): &Group) -> bool {
             .is_none_or(|setting| *setting == row.setting)
 }
 
-/// "STAIR, N = 500 (5 seeds)".
+/// "STAIR, N = 500 (5 seeds)". Runs of several budgets are counted budget by budget.
 fn key_name(group: &Group, rows: &[CurveRow]) -> String {
-    let mut seeds: BTreeMap<(&str, &str), BTreeSet<u64>> = BTreeMap::new();
+    let mut seeds: BTreeMap<(&str, &str, Option<u32>), BTreeSet<u64>> = BTreeMap::new();
     for row in rows.iter().filter(|row| is_in(row, group)) {
-        let of_curve = seeds.entry((&row.task, &row.setting)).or_default();
-        of_curve.insert(row.seed);
+        let of_curve = seeds.entry((&row.task, &row.setting, row.budget));
+        of_curve.or_default().insert(row.seed);
     }
     let name = line_name(&group.0, group.1.as_deref().unwrap_or_default());
     let n_seeds = seeds_in_words(seeds.values().map(BTreeSet::len));

@@ -56,8 +56,8 @@ fn the_report_has_tables_curves_and_points_the_same_each_time() {
 #[test]
 fn several_budgets_of_a_method_make_a_figure_of_their_own() {
     let mut text = String::new();
-    for (setting, budget) in [("40 answers", 40), ("80 answers", 80)] {
-        for seed in 1..=2 {
+    for (setting, budget, n_seeds) in [("40 answers", 40, 2), ("80 answers", 80, 3)] {
+        for seed in 1..=n_seeds {
             text += &Told {
                 setting,
                 seed,
@@ -79,6 +79,7 @@ fn several_budgets_of_a_method_make_a_figure_of_their_own() {
         .unwrap();
     assert!(drawn.text.contains("Budget (labels)") && !drawn.text.contains(">Labels<"));
     assert!(drawn.text.contains("Thick: interquartile mean."));
+    assert!(drawn.text.contains("STAIR (2–3 seeds)"));
     assert!(!artifacts[0].text.contains("Left out of the figure"));
     assert!(
         artifacts[0]
