@@ -37,12 +37,7 @@ async fn an_answer_that_the_browser_cannot_keep_is_asked_for_again() {
     }
     browser.until(IS_DONE).await;
     wait_until_stored(&browser).await;
-    let answers = desk.stored();
-    let n_skipped = answers
-        .iter()
-        .filter(|row| row["pressed"] == "skip")
-        .count();
-    assert_eq!((answers.len(), n_skipped), (2, 0), "{answers:?}");
+    assert_answered_without_skips(&desk, 2);
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -131,12 +126,7 @@ async fn clips_that_are_late_are_waited_for_and_not_passed_over() {
     }
     browser.until("late.length === 0").await;
     wait_until_stored(&browser).await;
-    let answers = desk.stored();
-    let n_skipped = answers
-        .iter()
-        .filter(|row| row["pressed"] == "skip")
-        .count();
-    assert_eq!((answers.len(), n_skipped), (5, 0), "{answers:?}");
+    assert_answered_without_skips(&desk, 5);
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -235,4 +225,12 @@ async fn of_the_answers_that_the_server_has_the_newest_stay_in_the_browser() {
     let kept = browser.run(kept, vec![]).await;
     let expected: Vec<u32> = (1..=2).chain(11..=60).collect();
     assert_eq!(kept, json!(expected));
+}
+
+/// Nothing was passed over.
+fn assert_answered_without_skips(desk: &Desk, n_answers: usize) {
+    let answers = desk.stored();
+    let is_skip = |row: &&serde_json::Value| row["pressed"] == "skip";
+    let n_skipped = answers.iter().filter(is_skip).count();
+    assert_eq!((answers.len(), n_skipped), (n_answers, 0), "{answers:?}");
 }

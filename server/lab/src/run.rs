@@ -7,15 +7,12 @@ use std::time::Duration;
 use domain::environment::EnvSpec;
 use domain::query::Query;
 use domain::random::{Rng, Stream};
-use domain::sampler::{QuerySampler, Uniform};
 use domain::schedule::Every;
 use domain::teacher::{Answered, Teacher};
-use learn::beliefs::LearnedBeliefs;
 use learn::replay::{BatchRule, Replay, ReplayMark};
 use learn::reward::{Estimate, Labeled, RewardFit, SteeringConfig};
 use serde::{Deserialize, Serialize};
 
-use crate::candidates::Pool;
 use crate::config::{RunConfig, WhileWaiting};
 use crate::folder::RunFolder;
 use crate::lanes::Lanes;
@@ -23,9 +20,10 @@ use crate::learner::{Due, Learner};
 use crate::message::{Activity, Command, Event, Finished, Refitted, SessionClosed};
 use crate::meter::Meter;
 use crate::method::Method;
-use crate::preferences::{AnswerState, Preferences};
-use crate::session::{Selection, Session};
+use crate::preferences::Preferences;
+use crate::session::Session;
 
+mod asking;
 mod disk;
 mod error;
 mod telling;
@@ -34,9 +32,6 @@ pub use error::RunError;
 
 /// How long the loop rests when there is nothing to do but wait for people.
 const REST: Duration = Duration::from_millis(20);
-
-/// Newest episodes by which scripted teachers measure, as in B-Pref.
-const TYPICAL_EPISODES: usize = 10;
 
 /// A run: an agent, its experience, and what is known of the answers.
 pub struct Run {
@@ -165,47 +160,6 @@ impl Run {
         }
     }
 
-    /// Puts what is open to the teacher again: after a resume nobody may have been asked yet.
-    fn offer_open_queries(&mut self, teacher: &mut dyn Teacher) -> Result<(), RunError> {
-        let Some(session) = &self.session else {
-            return Ok(());
-        };
-        let open = session.planned().iter();
-        let open = open.filter(|p| self.preferences.state(p.key()) == Some(AnswerState::Open));
-        let offers: Vec<_> = open.map(|p| p.offer(&self.replay)).collect();
-        Ok(teacher.ask(&offers)?)
-    }
-
-    /// Takes in answers that arrived; asks a replacement for each skip of the open session, unless
-    /// skips are to use up budget.
-    fn take_answers(&mut self, teacher: &mut dyn Teacher) -> Result<(), RunError> {
-        let mut answers = std::mem::take(&mut self.early);
-        answers.extend(teacher.collect(self.progress.consumed_sequence)?);
-        for answered in answers {
-            let consumed = &mut self.progress.consumed_sequence;
-            *consumed = (*consumed).max(answered.sequence);
-            let Some(before) = self.preferences.answer(&answered) else {
-                self.early.push(answered);
-                continue;
-            };
-            let is_new_skip = answered.preference.is_none() && before == AnswerState::Open;
-            let Some(session) = self
-                .session
-                .as_mut()
-                .filter(|s| s.index() == answered.key.session)
-            else {
-                self.progress.n_late += u32::from(!is_new_skip);
-                continue;
-            };
-            let is_replaced = is_new_skip && !self.config.queries.bpref_skips;
-            if is_replaced && let Some(replacement) = session.replacement() {
-                self.preferences.ask(replacement.key(), replacement.query());
-                teacher.ask(&[replacement.offer(&self.replay)])?;
-            }
-        }
-        Ok(())
-    }
-
     fn session_is_complete(&self) -> bool {
         let sufficient = self.config.queries.sufficient_fraction;
         self.session
@@ -217,93 +171,6 @@ impl Run {
         let has_steps_left = self.progress.step < self.config.training.total_steps;
         let waits = self.config.training.while_waiting == WhileWaiting::Pause || !has_steps_left;
         self.is_paused || (self.session.is_some() && waits)
-    }
-
-    fn asks_now(&self) -> bool {
-        self.session.is_none()
-            && self
-                .next_session_at()
-                .is_some_and(|due| self.progress.step >= due)
-            && self.pool().holds_a_pair(&self.replay)
-    }
-
-    /// Environment step at which the next session is due; `None` where there is none to come. Where
-    /// the run goes on while it waits, a session that was asked late moves those after it: between
-    /// any two lie as many steps as are to.
-    fn next_session_at(&self) -> Option<u64> {
-        let feedback = &self.config.feedback;
-        let planned = feedback.step_of(self.progress.n_sessions);
-        let due = match (self.config.training.while_waiting, self.progress.asked_at) {
-            (WhileWaiting::Train, Some(asked_at)) => planned.max(asked_at + feedback.every),
-            _ => planned,
-        };
-        let is_to_come = self.method.sampler.is_some()
-            && self.n_committed() < feedback.budget
-            && due < self.config.training.total_steps;
-        is_to_come.then_some(due)
-    }
-
-    /// Chooses a session's queries, makes them durable, and asks.
-    fn ask(
-        &mut self,
-        teacher: &mut dyn Teacher,
-        events: &mut dyn FnMut(Event),
-    ) -> Result<(), RunError> {
-        let index = self.progress.n_sessions;
-        self.demonstrate(Some(index), events)?;
-        let size = self.config.feedback.session_size(
-            index,
-            self.config.training.total_steps,
-            self.n_committed(),
-        );
-        let queries = &self.config.queries;
-        let mut rng = Rng::new(self.config.seed, Stream::Candidates, u64::from(index));
-        let n_candidates = size as usize * queries.candidates_per_query as usize;
-        let candidates = self.pool().draw(&self.replay, n_candidates, &mut rng);
-        let asked = self.preferences.asked();
-        let sampler: &dyn QuerySampler = match &self.method.sampler {
-            Some(sampler) if self.progress.n_fits > 0 => sampler.as_ref(),
-            _ => &Uniform, // nothing is believed before the first fit
-        };
-        let mut beliefs = LearnedBeliefs {
-            replay: &self.replay,
-            reward: &self.learner.reward,
-            temporal: self.learner.temporal.as_ref(),
-            stage: self.method.stage,
-            asked: &asked,
-        };
-        let selection = Selection {
-            index,
-            size,
-            seed: self.config.seed,
-            same_stage_fraction: queries.same_stage_fraction,
-            candidates: &candidates,
-            typical_reward: self.replay.typical_reward(TYPICAL_EPISODES),
-        };
-        let session = Session::choose(&selection, sampler, &mut beliefs);
-        let report = session.report(self.progress.step, &candidates, &mut beliefs, &self.replay);
-        for planned in session.planned() {
-            self.preferences.ask(planned.key(), planned.query());
-        }
-        self.session = Some(session);
-        self.progress.n_sessions += 1;
-        self.progress.asked_at = Some(self.progress.step);
-        self.say(Event::SessionOffered(report), events)?;
-        self.checkpoint_and_say(events)?;
-        self.offer_open_queries(teacher)
-    }
-
-    /// Where queries may come from.
-    fn pool(&self) -> Pool {
-        let queries = &self.config.queries;
-        let own = self.method.sampler.as_ref();
-        let newest_episodes = own.and_then(|sampler| sampler.newest_episodes());
-        Pool {
-            newest_episodes: newest_episodes.unwrap_or(queries.newest_episodes),
-            segment_len: self.config.segment_len(&self.spec),
-            leaves_last_start: queries.bpref_starts,
-            pairs_with_itself: queries.bpref_pairs,
-        }
     }
 
     /// Pairs that nobody is asked about, for methods that learn from them too: as many as belong to
@@ -344,12 +211,12 @@ impl Run {
     /// no session is to come that takes them with it, and of those that may still come as large a
     /// share is there as lets a session go on.
     fn late_answers_suffice(&self) -> bool {
+        if self.progress.n_late == 0 || self.session.is_some() || self.next_session_at().is_some() {
+            return false; // the first alone is so at nearly every step
+        }
         let n_late = f64::from(self.progress.n_late);
         let n_open = f64::from(self.preferences.n_open());
-        self.progress.n_late > 0
-            && self.session.is_none()
-            && self.next_session_at().is_none()
-            && n_late >= (n_late + n_open) * self.config.queries.sufficient_fraction
+        n_late >= (n_late + n_open) * self.config.queries.sufficient_fraction
     }
 
     /// The same as after a session, of answers that came too late for the last one.
@@ -497,26 +364,6 @@ impl Run {
                 .filter(|_| self.has_budget()),
             ends_at_time_limit: false,
         }
-    }
-
-    fn has_budget(&self) -> bool {
-        self.n_spent() < self.config.feedback.budget
-    }
-
-    /// Of the budget, with queries that may still be answered: what was not answered of a session
-    /// that went on with fewer can be answered later.
-    fn n_committed(&self) -> u32 {
-        self.n_spent() + self.preferences.n_open()
-    }
-
-    /// Of the budget.
-    fn n_spent(&self) -> u32 {
-        let n_skipped = if self.config.queries.bpref_skips {
-            self.preferences.n_skipped()
-        } else {
-            0
-        };
-        self.preferences.n_preferred() + n_skipped
     }
 
     /// Whether the rewards are moved by the critics on the way on from `step`, how, and by which
