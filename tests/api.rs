@@ -3,6 +3,7 @@
 mod blinding;
 mod clips;
 mod labelers;
+mod labels_page;
 mod leases;
 mod runs;
 mod store_on_disk;

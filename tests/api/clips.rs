@@ -22,8 +22,16 @@ fn a_clip_is_served_in_parts_and_never_changes() {
         .send_with("GET", &clip, None, &[("range", "bytes=5-10")])
         .expect(206);
     assert_eq!(part.text, "number");
-    ada.send_with("GET", &clip, None, &[("range", "bytes=9999-")])
+    let beyond = ada
+        .send_with("GET", &clip, None, &[("range", "bytes=9999-")])
         .expect(416);
+    assert_eq!(beyond.json()["type"], "/problems/no-such-range");
+    assert_eq!(
+        beyond.headers["content-range"],
+        format!("bytes */{}", whole.len())
+    );
+    let dated = [("if-unmodified-since", "Thu, 01 Jan 1970 00:00:00 GMT")];
+    ada.send_with("GET", &clip, None, &dated).expect(200);
     ada.send("GET", "/api/v1/clips/../../stair.sqlite", None)
         .expect(404);
     ada.send(

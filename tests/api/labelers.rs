@@ -69,6 +69,19 @@ fn a_name_that_the_server_keeps_for_itself_is_refused_with_a_way_back_to_the_for
 }
 
 #[test]
+fn a_browser_that_keeps_no_cookies_is_told_so_and_not_asked_for_the_name_without_end() {
+    let app = TestApp::start(1);
+    let page = format!("/runs/{}/label", app.run);
+    let typed = Some("name=Ada".to_owned());
+    // Where the name leads to, asked for without the cookie.
+    let reply = app.stranger().send_with("POST", &page, typed, &FORM);
+    let forgetful = reply.expect(200).text;
+    assert!(forgetful.contains("keeps no cookies"), "{forgetful}");
+    let first = app.stranger().send("GET", &page, None).expect(200).text;
+    assert!(!first.contains("keeps no cookies"), "{first}");
+}
+
+#[test]
 fn the_door_of_a_server_with_a_token_says_what_it_lacks() {
     let app = TestApp::start_guarded(1);
     let enter = |address: &str| app.stranger().send("GET", address, None);

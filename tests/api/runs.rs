@@ -39,6 +39,21 @@ fn every_address_that_answers_is_documented_and_the_other_way_round() {
 }
 
 #[test]
+fn every_address_in_the_description_is_on_the_page_for_people() {
+    let app = TestApp::start(1);
+    let all = app.stranger();
+    let document = all
+        .send("GET", "/api/v1/openapi.json", None)
+        .expect(200)
+        .json();
+    let page = all.send("GET", "/api", None).expect(200);
+    for path in document["paths"].as_object().expect("paths").keys() {
+        let told = format!("<code>{path}</code>");
+        assert!(page.text.contains(&told), "{path} is not on the page");
+    }
+}
+
+#[test]
 fn a_run_that_cannot_be_started_says_what_is_wrong() {
     let app = TestApp::start(1);
     let all = app.stranger();

@@ -1,7 +1,7 @@
 //! Data folders that somebody else holds, that are newer, or that were there before.
 
 use domain::teacher::Answered;
-use store::{NewAnswer, RunId, Store, StoreError, now_ms};
+use store::{BY_THE_PAGE, LabelsOf, NewAnswer, PassedOver, RunId, Store, StoreError, now_ms};
 
 use crate::stories::server_process::stair;
 use crate::support::{TestApp, clip, collection, query};
@@ -105,11 +105,60 @@ async fn a_lease_that_ran_out_goes_to_the_next_labeler_and_the_late_answer_is_ke
     assert_eq!(second[0].query, first[0].query);
     let late = store.answer(&first[0].id, ada.id, left()).await;
     assert!(matches!(late, Err(StoreError::Taken)), "{late:?}");
+    // Each of them is kept, and none twice.
+    let changed = NewAnswer {
+        pressed: "right".into(),
+        ..left()
+    };
+    for answer in [left(), changed] {
+        let late = store.answer(&first[0].id, ada.id, answer).await;
+        assert!(matches!(late, Err(StoreError::Taken)), "{late:?}");
+    }
+    assert_eq!(store.n_late_answers(run).await.expect("a number"), 2);
     store
         .answer(&second[0].id, bo.id, left())
         .await
         .expect("Bo's answer");
     assert_eq!(store.answers_after(run, 0).await.expect("answers").len(), 1);
+}
+
+#[tokio::test]
+async fn what_a_page_passed_over_is_told_until_somebody_answers_it() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let (store, run) = with_one_query(folder.path()).await;
+    let (ada, _) = store.sign_in("Ada").await.expect("Ada");
+    let lease = store
+        .lease(run, ada.id, 1, true, now_ms())
+        .await
+        .expect("a lease");
+    let skip = NewAnswer {
+        pressed: "skip".into(),
+        reason: Some(format!("{BY_THE_PAGE}no decoder")),
+        ..NewAnswer::default()
+    };
+    let skipped = store.answer(&lease[0].id, ada.id, skip).await;
+    let told = async || {
+        store
+            .passed_over(LabelsOf::Run(run), 5)
+            .await
+            .expect("read")
+    };
+    assert_eq!(
+        told().await,
+        [PassedOver {
+            query_id: lease[0].query.0,
+            session: 0,
+            labeler: "Ada".into(),
+            reason: "no decoder".into(),
+        }]
+    );
+    let answered = NewAnswer {
+        supersedes: Some(skipped.expect("stored").id),
+        ..left()
+    };
+    let answered = store.answer(&lease[0].id, ada.id, answered).await;
+    answered.expect("stored");
+    assert_eq!(told().await, []);
 }
 
 #[tokio::test]

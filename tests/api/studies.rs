@@ -264,6 +264,34 @@ fn each_mistake_of_a_file_comes_back_with_its_line() {
     assert!(way_back.contains("Return code"), "{way_back}");
 }
 
+/// It would be forgotten at once, and its link be used up.
+#[test]
+fn a_browser_that_keeps_no_cookies_does_not_use_its_link_up() {
+    let study = Open::start("preference");
+    let code = study.code();
+    let form = [("content-type", "application/x-www-form-urlencoded")];
+    let agree = |who: &Client| {
+        let typed = Some(format!("code={code}&agrees=yes"));
+        who.send_with("POST", "/join", typed, &form).expect(200)
+    };
+    let browser = Client::stranger_of(&study.server);
+    let door = browser.send("GET", &format!("/join?code={code}"), None);
+    let kept = browser.with_cookie_of(&door.expect(200));
+    let told = agree(&browser).text;
+    assert!(
+        told.contains("keeps no cookies") && told.contains("still works"),
+        "{told}"
+    );
+    let labeler = agree(&kept);
+    assert!(
+        labeler.text.contains("id=\"return-code\""),
+        "{}",
+        labeler.text
+    );
+    let labeler = browser.with_cookie_of(&labeler);
+    labeler.send("GET", "/seat", None).expect(200);
+}
+
 #[test]
 fn nobody_else_reaches_a_labelers_questions() {
     let study = Open::start("same_stage");

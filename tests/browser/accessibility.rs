@@ -27,13 +27,11 @@ async fn look_at_every_page(scheme: Scheme, size: (u32, u32)) {
     let desk = Desk::set_up(4).await;
 
     browser.goto(&desk.page("/")).await;
-    browser
-        .run(
-            "document.querySelectorAll('details').forEach((part) => { part.open = true; })",
-            vec![],
-        )
-        .await;
+    unfold(&browser).await;
     look("home", &browser).await;
+    browser.goto(&desk.page("/api")).await;
+    unfold(&browser).await;
+    look("api", &browser).await;
     browser.goto(&desk.page("/experiments")).await;
     look("experiments", &browser).await;
     browser.goto(&desk.page("/studies")).await;
@@ -68,6 +66,10 @@ async fn look_at_every_page(scheme: Scheme, size: (u32, u32)) {
         .goto(&desk.page(&format!("/runs/{}", desk.run)))
         .await;
     look("run", &browser).await;
+    browser
+        .goto(&desk.page(&format!("/labels?run={}", desk.run)))
+        .await; // its filters are open
+    look("answers", &browser).await;
 }
 
 /// Every page of a study, from its preparation to its results.
@@ -116,6 +118,16 @@ async fn axe_finds_nothing_on_the_pages_of_a_study() {
     study.close();
     browser.goto(&page("/seat")).await;
     look("closed", &browser).await;
+}
+
+/// Opens all that a page keeps folded.
+async fn unfold(browser: &Browser) {
+    browser
+        .run(
+            "document.querySelectorAll('details').forEach((part) => { part.open = true; })",
+            vec![],
+        )
+        .await;
 }
 
 async fn look(page: &str, browser: &Browser) {

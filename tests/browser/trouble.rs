@@ -114,7 +114,7 @@ async fn clips_that_are_late_are_waited_for_and_not_passed_over() {
     };
     let desk = Desk::set_up(6).await;
     desk.sit_down(&browser).await;
-    let busy = "const send = fetch; window.late = [429, 408, 401, 503];
+    let busy = "const send = fetch; window.late = [429, 403, 408, 404, 401, 503];
         window.fetch = async (url, how) => {
             const isLate = String(url).includes('/clips/') && late.length > 0;
             return isLate ? new Response('slow down', { status: late.shift() }) : send(url, how);
@@ -127,6 +127,122 @@ async fn clips_that_are_late_are_waited_for_and_not_passed_over() {
     browser.until("late.length === 0").await;
     wait_until_stored(&browser).await;
     assert_answered_without_skips(&desk, 5);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_page_that_cannot_show_several_pairs_in_a_row_asks_no_more_and_the_researcher_is_told() {
+    let Some(browser) = Browser::open(Scheme::Light, SCREEN).await else {
+        return;
+    };
+    let desk = Desk::set_up(7).await;
+    desk.lose_clips();
+    browser.goto(&desk.label_page()).await;
+    browser.press("Ada\u{E007}").await;
+    browser
+        .until("document.querySelector('#waiting').dataset.kind === 'undecodable'")
+        .await;
+    let told = browser.text("#waiting-text").await;
+    assert!(told.contains("3 pairs in a row"), "{told}");
+    wait_until_stored(&browser).await;
+    let skipped = desk.stored();
+    let pairs = skipped.iter().filter(|row| row["question"] == "preference");
+    assert_eq!(pairs.count(), 3, "{skipped:?}");
+
+    browser
+        .goto(&desk.page(&format!("/runs/{}", desk.run)))
+        .await;
+    let told = browser.text("#broken").await;
+    let n = told.matches("could not be shown to Ada").count();
+    assert!(n >= 3, "{told}");
+}
+
+/// A browser without a decoder for the clips asks about none: nothing is skipped in anybody's name.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_browser_that_cannot_play_the_clips_is_told_so_and_asked_nothing() {
+    let Some(browser) = Browser::open(Scheme::Light, SCREEN).await else {
+        return;
+    };
+    let desk = Desk::set_up(2).await;
+    desk.sit_down(&browser).await;
+    // The page's script once more, as it starts where nothing can be decoded.
+    let again = "HTMLMediaElement.prototype.canPlayType = () => '';
+        delete window.VideoDecoder;
+        const script = document.createElement('script');
+        script.type = 'module';
+        script.src = '/static/label.js?again';
+        document.head.append(script);";
+    browser.run(again, vec![]).await;
+    browser
+        .until("document.querySelector('#waiting').dataset.kind === 'undecodable' && document.querySelector('#waiting').checkVisibility()")
+        .await;
+    assert!(browser.text("#waiting-text").await.contains("H.264"));
+    assert!(desk.stored().is_empty());
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_somebody_on_the_way_says_to_an_answer_is_not_the_servers_word() {
+    let Some(browser) = Browser::open(Scheme::Light, SCREEN).await else {
+        return;
+    };
+    let desk = Desk::set_up(3).await;
+    desk.sit_down(&browser).await;
+    let meddle = "const send = fetch; window.others = [403, 400, 404, 413, 200];
+        window.fetch = async (url, how) => {
+            if (how?.method !== 'PUT' || others.length === 0) return send(url, how);
+            const status = others.shift();
+            const [body, type] = status === 200 ? ['{}', 'application/json'] : ['<h1>Sign in</h1>', 'text/html'];
+            return new Response(body, { status, headers: { 'content-type': type } });
+        };";
+    browser.run(meddle, vec![]).await;
+    until_judged(&browser).await;
+    browser.press("1").await;
+    browser.until("others.length === 0").await;
+    wait_until_stored(&browser).await;
+    assert_answered_without_skips(&desk, 1);
+    assert_eq!(browser.text("#undelivered").await, "");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_answer_that_stands_already_is_what_going_back_shows() {
+    let Some(browser) = Browser::open(Scheme::Light, SCREEN).await else {
+        return;
+    };
+    let desk = Desk::set_up(3).await;
+    desk.sit_down(&browser).await;
+    until_judged(&browser).await;
+    let elsewhere = "const lease = document.body.dataset.shown;
+        return fetch(`/api/v1/leases/${lease}/answer`, {
+            method: 'PUT', headers: { 'content-type': 'application/json' }, body: JSON.stringify({ answer: 'right' }),
+        }).then((reply) => reply.status);";
+    assert_eq!(browser.run(elsewhere, vec![]).await, json!(201));
+    browser.press("1").await;
+    browser
+        .until("document.querySelector('#notice').textContent.includes('did not take an answer')")
+        .await;
+    browser.press("z").await;
+    browser.until(IS_GONE_BACK).await;
+    assert_eq!(browser.text("#before").await, "right is better");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn nobody_goes_back_to_what_another_person_answered_in_the_same_browser() {
+    let Some(browser) = Browser::open(Scheme::Light, SCREEN).await else {
+        return;
+    };
+    let desk = Desk::set_up(4).await;
+    desk.sit_down(&browser).await;
+    answer(&browser, "1").await;
+    wait_until_stored(&browser).await;
+    browser.lose_cookies().await;
+    browser.goto(&desk.label_page()).await;
+    browser.press("Ben\u{E007}").await;
+    browser
+        .until("document.querySelector('#guidance[open]') !== null")
+        .await; // Ben has not read it
+    browser.press("\u{E007}").await;
+    browser.until("document.body.dataset.shown").await;
+    let can_go_back = "!document.querySelector('#undo').disabled";
+    assert_eq!(browser.value(can_go_back).await, json!(false));
 }
 
 #[tokio::test(flavor = "multi_thread")]

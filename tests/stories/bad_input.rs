@@ -111,6 +111,81 @@ fn a_setting_that_does_not_fit_is_named_with_its_line() {
 }
 
 #[test]
+fn what_has_a_place_of_its_own_is_not_taken_from_another() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let here = folder.path();
+    let set = |setting| ["train", "go-fetch-return", "--set", setting];
+    expect(
+        &set("task=window-open"),
+        here,
+        &["--set task=window-open: ", "stair train TASK"],
+    );
+    expect(&set("method=pebble"), here, &["use --method"]);
+    expect(&set("seed=9"), here, &["use --seed"]);
+    std::fs::write(here.join("mine.toml"), "seed = 3\n").expect("a file");
+    expect(
+        &["train", "--config", "mine.toml"],
+        here,
+        &["mine.toml: no task is named", "task = "],
+    );
+    expect(
+        &["train", "go-fetch-return", "--steps", "2000"],
+        here,
+        &["feedback.first_step", "below training.total_steps"],
+    );
+    assert!(!here.join("data").exists(), "nothing was begun");
+}
+
+#[test]
+fn numbers_and_choices_that_are_none_are_named_with_what_they_may_be() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let wrong: [(&str, &[&str]); 9] = [
+        (
+            "evaluate window-open --policy expert --noise -1",
+            &["--noise is -1", "0 or more"],
+        ),
+        ("train window-open --labels -1", &["--labels", "0..="]),
+        ("train window-open --seed -1", &["--seed", "0 or more"]),
+        ("study invite 1 --days -1", &["--days", "1..=365"]),
+        ("study invite 1 --labelers 0", &["--labelers", "1..="]),
+        ("study answer 1 --labelers 0", &["--labelers", "1..="]),
+        (
+            "figure strips x.queries --top 0 --out x.png",
+            &["--top", "1 or more"],
+        ),
+        ("serve --bind here", &["for instance 127.0.0.1:8080"]),
+        ("export", &["--run", "--study"]),
+    ];
+    for (line, words) in wrong {
+        let arguments: Vec<&str> = line.split(' ').collect();
+        expect(&arguments, folder.path(), words);
+    }
+}
+
+#[test]
+fn what_is_in_the_way_of_results_is_told_before_the_work() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let here = folder.path();
+    for name in ["README.md", "rows.jsonl"] {
+        std::fs::write(here.join(name), "no rows\n").expect("a file");
+    }
+    for line in [
+        "render window-open --policy expert --out README.md/x.png",
+        "figure curves rows.jsonl --out README.md/x.svg",
+        "experiment abstract-mdp --out README.md",
+        "experiment run go-fetch-return --out README.md",
+        "experiment report rows.jsonl --out README.md",
+        "study pack run --out README.md/x.queries",
+        "export --run 1 --out README.md/x.csv",
+    ] {
+        let arguments: Vec<&str> = line.split(' ').collect();
+        expect(&arguments, here, &["README.md is no folder", "--out"]);
+    }
+    let left = std::fs::read_dir(here).expect("a folder").count();
+    assert_eq!(left, 2, "nothing was made");
+}
+
+#[test]
 fn a_policy_or_a_run_that_is_none_is_named() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let here = folder.path();
@@ -128,6 +203,13 @@ fn a_policy_or_a_run_that_is_none_is_named() {
         &["train", "--resume", "nowhere"],
         here,
         &["nowhere", "holds no run"],
+    );
+    std::fs::create_dir(here.join("damaged")).expect("a folder");
+    std::fs::write(here.join("damaged/config.toml"), "seed = \n").expect("a file");
+    expect(
+        &["train", "--resume", "damaged"],
+        here,
+        &["damaged/config.toml: line 1"],
     );
     expect(
         &["export", "--run", "1", "--data", "nowhere"],
@@ -147,6 +229,8 @@ fn a_policy_of_another_task_a_missing_device_and_too_little_memory_are_named() {
         "quick",
         "--steps",
         "50",
+        "--labels",
+        "0",
         "--set",
         "evaluation.episodes=1",
         "--out",
@@ -259,6 +343,19 @@ fn an_experiment_that_does_not_fit_is_named_with_its_line() {
         &run("empty.toml"),
         here,
         &["empty.toml", "line 5", "nothing to run"],
+    );
+    grid("mine.toml", "[\"pebble\"]");
+    std::fs::create_dir(here.join("theirs")).expect("a folder");
+    let theirs = "title = \"y\"\n[axes]\ntasks = [\"go-fetch-return\"]\nmethods = [\"stair\"]\n";
+    std::fs::write(here.join("theirs/experiment.toml"), theirs).expect("a file");
+    expect(
+        &["experiment", "run", "mine.toml", "--out", "theirs"],
+        here,
+        &[
+            "holds another experiment, 'y'",
+            "go-fetch-return.stair.oracle.1",
+            "--out",
+        ],
     );
     expect(&run("nowhere.toml"), here, &["nowhere.toml"]);
     expect(&run("mine/grid"), here, &["cannot read mine/grid"]);

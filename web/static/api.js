@@ -32,22 +32,37 @@ export async function request(method, url, body) {
     cache: 'no-store',
     signal: inTime(),
   });
-  if (!response.ok) throw await problemOf(response);
+  if (!response.ok) throw await refusalOf(response);
   const parsed = readJson(await response.text());
-  if (parsed === null) throw new TypeError('not a reply of this server'); // of a hotel's, say, that wants a login first
+  if (parsed === null) throw notOurs();
   return parsed;
+}
+
+/** Somebody on the way has answered: a hotel's network, say, that wants a login first. Counts as no reply. */
+export function notOurs() {
+  return new TypeError('not a reply of this server');
 }
 
 /** Ends a request that takes too long, or before that once `cancelled` says so. */
 export function inTime(cancelled = null) {
-  const late = AbortSignal.timeout(TIMEOUT_MS);
-  return cancelled ? AbortSignal.any([late, cancelled]) : late;
+  const ending = new AbortController();
+  setTimeout(() => ending.abort(new DOMException('no reply in time', 'TimeoutError')), TIMEOUT_MS);
+  if (cancelled?.aborted) ending.abort();
+  cancelled?.addEventListener('abort', () => ending.abort());
+  return ending.signal;
 }
 
-/** What a reply that is not ok says. @returns {Promise<Problem>} */
-export async function problemOf(response) {
+/**
+ * What a reply that is not ok says. Only the server itself can say no: anybody else on the way may be
+ * busy, and what else they answer is no reply.
+ *
+ * @returns {Promise<Problem | TypeError>}
+ */
+export async function refusalOf(response) {
+  const isOurs = response.headers.get('content-type')?.startsWith('application/problem+json');
   const text = await response.text();
-  return new Problem(response.status, readJson(text) ?? { title: text.slice(0, 200) });
+  const problem = new Problem(response.status, (isOurs && readJson(text)) || { title: text.slice(0, 200) });
+  return isOurs || problem.isPassing ? problem : notOurs();
 }
 
 function readJson(text) {

@@ -1,9 +1,20 @@
 // Loads a clip and decodes every frame of it once, so that any frame can be shown at any moment.
-import { inTime, problemOf } from './api.js';
+import { inTime, notOurs, Problem, refusalOf } from './api.js';
 import { readMp4 } from './mp4.js';
+
+/** No clip takes longer to decode; where it does, the browser has stopped without a word. */
+const DECODING_MS = 20_000;
 
 /** A clip that is gone, or whose bytes arrived but cannot be shown; loading it again would not help. */
 export class BrokenClip extends Error {}
+
+/** Whether this browser has a decoder for the server's clips at all: H.264, baseline. */
+export async function canShowClips() {
+  const codec = 'avc1.42E01E';
+  if (document.createElement('video').canPlayType(`video/mp4; codecs="${codec}"`)) return true;
+  if (typeof VideoDecoder === 'undefined') return false;
+  return VideoDecoder.isConfigSupported({ codec }).then(({ supported }) => supported, () => false);
+}
 
 /** All frames of a clip, ready to draw. */
 export class Clip {
@@ -46,12 +57,11 @@ export class Clip {
 export async function loadClip(url, known = {}, cancelled = null) {
   const response = await fetch(url, { signal: inTime(cancelled) });
   if (!response.ok) {
-    const problem = await problemOf(response);
-    if (problem.isPassing || problem.status === 401) throw problem;
-    throw new BrokenClip(`the clip is not there: ${problem.body.title || problem.status}`);
+    const reason = await refusalOf(response);
+    if (!(reason instanceof Problem) || reason.isPassing || reason.status === 401) throw reason;
+    throw new BrokenClip(`the clip is not there: ${reason.body.title || reason.status}`);
   }
-  const isClip = response.headers.get('content-type')?.startsWith('video/');
-  if (!isClip) throw new TypeError('not a reply of this server'); // as of a proxy that wants a login first
+  if (!response.headers.get('content-type')?.startsWith('video/')) throw notOurs();
   const bytes = await response.arrayBuffer();
   try {
     return await decodeExactly(bytes);
@@ -111,7 +121,7 @@ async function decodeExactly(bytes) {
     );
   }
   try {
-    await decoder.flush();
+    await inDue(decoder.flush());
   } catch (reason) {
     failure ??= reason;
   }
@@ -144,7 +154,7 @@ async function decodeBySeeking(bytes, known) {
     return new Clip(frames, fps);
   } catch (reason) {
     for (const frame of frames) frame.close();
-    throw new BrokenClip(`the browser could not show it: ${reason.message}`);
+    throw reason instanceof Overdue ? reason : new BrokenClip(`the browser could not show it: ${reason.message}`);
   } finally {
     video.removeAttribute('src');
     video.load();
@@ -152,9 +162,22 @@ async function decodeBySeeking(bytes, known) {
   }
 }
 
+/** The browser was asked to decode and says nothing; it may do so later. */
+class Overdue extends Error {}
+
+/** @returns {Promise<any>} what `decoding` comes to; rejects with Overdue where it comes to nothing */
+function inDue(decoding) {
+  let timer;
+  const late = new Promise((_, reject) => {
+    timer = setTimeout(() => reject(new Overdue('the browser takes too long to decode it')), DECODING_MS);
+  });
+  return Promise.race([decoding, late]).finally(() => clearTimeout(timer));
+}
+
 function once(video, event) {
-  return new Promise((resolve, reject) => {
+  const happening = new Promise((resolve, reject) => {
     video.addEventListener(event, resolve, { once: true });
     video.addEventListener('error', () => reject(new Error(video.error?.message || 'the browser cannot decode it')), { once: true });
   });
+  return inDue(happening);
 }

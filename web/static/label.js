@@ -1,5 +1,8 @@
 // The labeler's page: one key stores the answer and shows the next pair.
 import { recall, remember } from './choices.js';
+import { canShowClips } from './clip.js';
+import { KeptFocus } from './focus.js';
+import { isPlain, meaningOf } from './keys.js';
 import { Outbox } from './outbox.js';
 import { $ } from './page.js';
 import './pair.js';
@@ -8,11 +11,6 @@ import { Settled } from './settled.js';
 import { WaitingCard } from './waiting.js';
 import { announce, notice, tellAllSent, tellKnown, tellSaved, tellUndelivered, tellUnsaved, tellWaitingAnswers } from './words.js';
 
-const KEYS = {
-  preference: { 1: 'left', ArrowLeft: 'left', 2: 'right', ArrowRight: 'right', 3: 'equal', ArrowDown: 'equal' },
-  same_stage: { s: 'same', d: 'different' },
-};
-const PLAYER_KEYS = { ' ': 'toggle', ',': 'back', '.': 'forward', '[': 'slower', ']': 'faster', r: 'restart' };
 const WORDS = { left: 'left is better', right: 'right is better', equal: 'about the same', same: 'same stage', different: 'different stages', skip: 'skipped' };
 /** Nobody judges a pair this soon: a key that bounced, or was meant for the pair before. */
 const TOO_SOON_MS = 150;
@@ -22,21 +20,26 @@ const WAITING_MS = 1_000;
 const SLOW_MS = 500;
 /** A clip that cannot be shown is passed over again, where this browser could not keep that it was. */
 const PASS_AGAIN_MS = 5_000;
+/** After so many pairs in a row that cannot be shown it is not the pairs. */
+const MOST_BROKEN = 3;
 
 const page = $('label');
 const run = page.dataset.run;
 const player = $('pair');
 const guidance = $('guidance');
+/** Names what this labeler has read; another person at the same browser has not. */
+const whoRead = `stair-guidance-${page.dataset.labeler}`;
 const reasons = $('reasons');
 /** A study: fixed pairs, practice with a word on each answer, and a task after this one. */
 const isStudy = 'study' in page.dataset;
 const feedback = $('feedback');
 const waiting = new WaitingCard(run, isStudy);
+const focus = new KeptFocus($('working'));
 
 /** What is on: `{lease, left, right}`, and whether it is an answered one that was gone back to. */
 let current = null;
 let isChanging = false;
-/** Pair that waits, prepared, while an answered one is changed. */
+/** Pair that waits, prepared, while an answered one is changed, with what was watched of it: `watch`. */
 let interrupted = null;
 let history = [];
 /** Ends the wait for an answered pair that is fetched again; till then what is on stays on and takes no answer. */
@@ -47,15 +50,25 @@ let pressedAt = 0;
 let settled;
 let usesShortcuts = recall('stair-shortcuts') !== 'off';
 let outbox;
+/** Queries whose clips could not be shown, since the last pair that could. */
+const broken = new Set();
+/** Why nothing more is asked here until the page is loaded again: what the card says. */
+let stuck = null;
 /** This browser's other tabs, told of answers. */
 let tabs;
 let ready;
 
 async function start() {
+  waiting.tell({ kind: 'open' }, true);
+  setStage('waiting');
   try {
     await openKept();
   } catch (reason) {
-    return cannotStart(reason);
+    console.error('answers cannot be kept:', reason);
+    return stop('keepless', 'This browser keeps no data for this site. Allow it, or use another browser.');
+  }
+  if (!(await canShowClips())) {
+    return stop('undecodable', 'The clips are H.264 video, which this browser does not play. Any current Firefox, Chrome, Edge or Safari does.');
   }
   const shown = () => [current, interrupted].filter(Boolean).map((pair) => pair.lease);
   ready = new ReadyPairs(run, (lease) => settled.has(lease), shown);
@@ -69,18 +82,23 @@ async function start() {
 
 /** What this browser keeps of answers. */
 async function openKept() {
-  outbox = await Outbox.open(run);
+  outbox = await Outbox.open(run, page.dataset.labeler);
   tabs = new BroadcastChannel('stair-answered');
   history = await outbox.history();
   settled = new Settled(await outbox.answeredLeases(), history);
 }
 
-/** No answer is asked for that could be lost. */
-function cannotStart(reason) {
-  console.error('answers cannot be kept:', reason);
-  $('help').hidden = true; // nothing to press does anything
-  waiting.tell({ kind: 'keepless', message: 'This browser keeps no data for this site. Allow it, or use another browser.' }, false);
+/** Asks for no answer that could be lost, or about clips that cannot be seen. */
+function stop(kind, message) {
+  stuck = { kind, message };
+  if (!current) tellStuck();
+}
+
+function tellStuck() {
+  $('help').hidden = true; // there is nothing to compare
+  waiting.tell(stuck, false);
   setStage('waiting');
+  tellUndo();
 }
 
 // --- showing -----------------------------------------------------------------------------------
@@ -88,6 +106,7 @@ function cannotStart(reason) {
 /** Puts the next prepared pair on, or says what is being waited for. */
 function proceed() {
   if (current || turningBack) return;
+  if (stuck) return tellStuck();
   const next = interrupted ?? ready.take();
   interrupted = null;
   if (next) show(next, null);
@@ -101,10 +120,12 @@ function proceed() {
 }
 
 function show(pair, before) {
+  broken.clear();
   current = pair;
   isChanging = before !== null;
   const isStage = pair.lease.question === 'same_stage';
   page.dataset.question = pair.lease.question;
+  $('help').hidden = false;
   $('question').textContent = isStage ? 'Are both at the same stage of the task?' : 'Which one does better?';
   $('practice').hidden = !pair.lease.practice;
   $('again').hidden = !isChanging;
@@ -113,7 +134,8 @@ function show(pair, before) {
   page.dataset.shown = '';
   setShownAt(Infinity);
   setStage('working');
-  player.show(pair.left, pair.right);
+  focus.restore(document.querySelector(`.answers.${isStage ? 'stage' : 'preference'} button`));
+  player.show(pair.left, pair.right, pair.watch);
 }
 
 /** Takes off a pair that is not to be answered here any more. */
@@ -243,11 +265,11 @@ async function undo() {
   turningBack = turning;
   setTimeout(() => { if (turningBack === turning) offerToStay(true); }, SLOW_MS);
   try {
-    const pair = await preparePair(row.lease, turning.signal);
+    const pair = await preparePair(row.lease, { cancelled: turning.signal });
     const before = await standing(row);
     if (turning.signal.aborted) return releasePair(pair);
     if (isChanging) releasePair(current);
-    else interrupted = current ?? interrupted;
+    else if (current) interrupted = { ...current, watch: player.watch };
     show(pair, before);
     announce(`Back to a pair you answered: ${WORDS[before]}. Answer again to change it.`);
   } catch (reason) {
@@ -299,8 +321,13 @@ function leaveUnchanged() {
   releasePair(leaving);
 }
 
-/** Nobody pressed anything: the page itself passes the pair over, and says why. */
+/**
+ * Nobody pressed anything: the page itself passes the pair over, and says why. Where one after the other
+ * cannot be shown, it asks no more: what is skipped in somebody's name is not asked again.
+ */
 async function skipBroken({ lease, reason }) {
+  broken.add(lease.query_id);
+  if (broken.size > MOST_BROKEN) return stop('undecodable', `${MOST_BROKEN} pairs in a row could not be shown (${reason.message}) and were passed over. The others are left for another browser, or a later time. Please tell whoever asked you to answer.`);
   settle(lease, 'skip');
   if (current && !isChanging && settled.has(current.lease)) takeOff();
   const body = {
@@ -326,6 +353,7 @@ let refillTimer = 0;
 
 async function refill() {
   clearTimeout(refillTimer);
+  if (stuck) return;
   await ready.refill();
   if (!current) proceedIfReady();
   const isIdle = !current && !ready.isPreparing;
@@ -334,7 +362,7 @@ async function refill() {
 }
 
 function proceedIfReady() {
-  if (ready.nReady > 0 || interrupted) proceed();
+  if (ready.isNextReady || interrupted) proceed();
 }
 
 function tellProgress({ state, progress }) {
@@ -351,6 +379,7 @@ let nTold = 0;
 
 /** A study's last pair is done, and the way on open, once every answer is with the server. */
 async function tellWaiting(state) {
+  if (stuck) return; // it is told already
   const turn = (nTold += 1);
   const isUnsent = isStudy && state.kind === 'done' && !(await outbox.isEmpty());
   if (turn === nTold) waiting.tell(isUnsent ? { kind: 'open' } : state, ready.isPreparing);
@@ -367,9 +396,9 @@ function uncovered() {
   if (!document.querySelector('dialog[open]')) player.uncover();
 }
 
-/** Guidance comes before the first pair, and again when its words have changed. */
+/** Guidance comes before a labeler's first pair, and again when its words have changed. */
 function greet() {
-  if (recall('stair-guidance') === page.dataset.guidance) return;
+  if (recall(whoRead) === page.dataset.guidance) return;
   cover(guidance);
 }
 
@@ -398,6 +427,8 @@ function listen() {
   });
   ready.addEventListener('ready', () => { if (!current) proceedIfReady(); });
   ready.addEventListener('broken', ({ detail }) => skipBroken(detail));
+  ready.addEventListener('late', ({ detail }) => late(detail.reason));
+  ready.addEventListener('gone', ({ detail }) => takenByOthers(detail.lease));
   ready.addEventListener('offline', () => offline());
   ready.addEventListener('refused', ({ detail }) => refused(detail));
   outbox.addEventListener('saved', ({ detail }) => {
@@ -410,12 +441,12 @@ function listen() {
     if (detail.why === 'stranger') tellKnown(false);
   });
   outbox.addEventListener('undelivered', ({ detail }) => tellUndelivered(detail));
-  outbox.addEventListener('refused', ({ detail: { message, lease, isForgotten } }) => {
+  outbox.addEventListener('refused', ({ detail: { message, lease, standing } }) => {
     notice(`The server did not take an answer: ${message}`, true);
-    if (isForgotten) {
+    if (standing === null) {
       tabs.postMessage({ lease, answer: null });
       forgetAnswer(lease);
-    }
+    } else if (standing !== undefined) noteChange(lease, standing);
     refill();
   });
   tabs.addEventListener('message', ({ data }) => {
@@ -423,7 +454,7 @@ function listen() {
     else askAgain(data.lease);
   });
   for (const dialog of document.querySelectorAll('dialog')) dialog.addEventListener('close', uncovered);
-  guidance.addEventListener('close', () => remember('stair-guidance', page.dataset.guidance));
+  guidance.addEventListener('close', () => remember(whoRead, page.dataset.guidance));
   $('shortcuts').addEventListener('change', () => {
     usesShortcuts = $('shortcuts').checked;
     remember('stair-shortcuts', usesShortcuts ? 'on' : 'off');
@@ -436,10 +467,30 @@ function offline() {
   tellWaiting({ kind: 'offline', message: 'No pair is left to show here. This page tries again by itself, and every answer is kept.' });
 }
 
+/** The next pair's clips do not come, though the server is there. */
+function late(reason) {
+  if (!current) tellWaiting({ kind: 'late', message: `Its clips have not come through: ${reason.message}. This page goes on trying.` });
+}
+
+/** Nobody was seen here for so long that somebody else was asked. */
+function takenByOthers(lease) {
+  if (interrupted?.lease.lease_id === lease.lease_id) {
+    releasePair(interrupted);
+    interrupted = null;
+  }
+  if (!isChanging && current?.lease.lease_id === lease.lease_id) {
+    notice('Somebody else has that pair by now; here is the next one.');
+    takeOff();
+  }
+  refill();
+}
+
 function refused(problem) {
   const isStranger = problem.status === 401;
   if (isStranger) tellKnown(false);
-  if (!current) tellWaiting(isStranger ? { kind: 'stranger' } : { kind: 'failed', message: problem.message });
+  if (current) return;
+  const isOver = problem.body.type === '/problems/study-state';
+  tellWaiting(isStranger ? { kind: 'stranger' } : { kind: isOver ? 'over' : 'failed', message: problem.message });
 }
 
 function answeredElsewhere({ lease, answer: word }) {
@@ -468,23 +519,22 @@ function askAgain(lease) {
 }
 
 function keyPressed(event) {
-  if (!usesShortcuts || event.defaultPrevented || event.ctrlKey || event.metaKey || event.altKey || event.repeat && !PLAYER_KEYS[event.key]) return;
-  if (reasons.open) return reasonPressed(event);
+  if (!usesShortcuts || !isPlain(event)) return;
+  const { answer: word, player: control, page: deed } = meaningOf(event, current?.lease.question);
+  if (reasons.open) return void (event.repeat || reasonPressed(event));
   if (feedback?.open) return; // Enter and Escape are the dialog's own
   if (guidance.open) {
-    if (event.key === '?') guidance.close();
+    if (deed === 'guidance') guidance.close();
     return;
   }
-  if (event.key === '?') return act(event, openGuidance);
+  if (deed === 'guidance') return act(event, openGuidance);
   const isField = event.target.matches('input, textarea, select');
   const isScrub = event.target.dataset?.do === 'scrub';
   if (isField && !isScrub) return;
-  const word = current && KEYS[current.lease.question]?.[event.key];
   if (word) return act(event, () => answer(word, 'key', null, event.timeStamp));
-  if (event.key === 'z') return act(event, undo);
-  if (event.key === 'Escape') return act(event, leaveUnchanged);
-  if (event.key === 'u' && current) return act(event, askReason);
-  const control = PLAYER_KEYS[event.key];
+  if (deed === 'undo') return act(event, undo);
+  if (deed === 'leave') return act(event, leaveUnchanged);
+  if (deed === 'unsure' && current) return act(event, askReason);
   const pressesButton = event.key === ' ' && event.target.matches('button, a, summary');
   if (control && current && !pressesButton) act(event, () => player.do(control));
 }

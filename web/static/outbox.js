@@ -4,7 +4,7 @@
 // lost connection, a closed lid, a restarted server or a lost cookie lose nothing. Sending twice
 // is harmless, the server stores an answer to a lease once. Of acknowledged answers the newest of
 // each run stay, to be gone back to.
-import { Problem, request } from './api.js';
+import { notOurs, Problem, request } from './api.js';
 
 /** Answered pairs that can be gone back to. */
 export const HISTORY = 50;
@@ -12,19 +12,21 @@ const FIRST_RETRY_MS = 500;
 const LAST_RETRY_MS = 5_000;
 
 /**
- * @typedef {object} Answered one answered pair: `{lease_id, run, lease, answer, answer_id, at}`;
+ * @typedef {object} Answered one answered pair: `{lease_id, run, labeler, lease, answer, answer_id, at}`;
  *   `answer_id` is null until the server has acknowledged it
  */
 
 /**
  * Fires `saved` ({stored_at, lease_id}) · `waiting` ({count, why}) while nothing gets through: `offline`,
  * `busy`, or `stranger` when the server does not know who answers · `undelivered` ({count}) when it does
- * not take some from here, which stay in this browser · `refused` ({message, lease, isForgotten}) when it
- * does not take one at all; `isForgotten` when none stands for its lease, so that it can be asked again.
+ * not take some from here, which stay in this browser · `refused` ({message, lease, standing}) when it
+ * does not take one at all; `standing` is the word that stands for its lease, null when none does and it
+ * can be asked again, undefined when this browser does not know it.
  */
 export class Outbox extends EventTarget {
   #database;
   #run;
+  #labeler;
   #sending = false;
   /** Something was answered, or heard of, while the last was being sent. */
   #isToSendAgain = false;
@@ -33,10 +35,14 @@ export class Outbox extends EventTarget {
   /** Leases whose answers the server does not take from here; tried again when it offers them, or a page is opened. */
   #undelivered = new Set();
 
-  /** @param {string} run only this run's history is told; every run's unsent answers are sent */
-  static async open(run) {
+  /**
+   * @param {string} run only this run's history is told; every run's unsent answers are sent
+   * @param {string} labeler who answers on this page; what others answered in this browser is not gone back to
+   */
+  static async open(run, labeler) {
     const outbox = new Outbox();
     outbox.#run = run;
+    outbox.#labeler = labeler;
     outbox.#database = await openDatabase();
     await outbox.#prune().catch((reason) => console.warn('old answers stay in this browser:', reason));
     return outbox;
@@ -63,10 +69,11 @@ export class Outbox extends EventTarget {
     this.#sendSoon(0);
   }
 
-  /** The run's answered pairs, oldest first. @returns {Promise<Answered[]>} */
+  /** The run's pairs that this labeler answered, oldest first. @returns {Promise<Answered[]>} */
   async history() {
     const all = await this.#read('answered', (store) => store.getAll());
-    return all.filter((row) => row.run === this.#run).sort((a, b) => a.at - b.at).slice(-HISTORY);
+    const isTheirs = (row) => row.run === this.#run && (row.labeler ?? this.#labeler) === this.#labeler;
+    return all.filter(isTheirs).sort((a, b) => a.at - b.at).slice(-HISTORY);
   }
 
   /**
@@ -98,7 +105,7 @@ export class Outbox extends EventTarget {
 
   /** @returns {Answered} not acknowledged */
   #answered(lease, body) {
-    return { lease_id: lease.lease_id, run: this.#run, lease, answer: body.answer, answer_id: null, at: Date.now() };
+    return { lease_id: lease.lease_id, run: this.#run, labeler: this.#labeler, lease, answer: body.answer, answer_id: null, at: Date.now() };
   }
 
   /**
@@ -182,16 +189,19 @@ export class Outbox extends EventTarget {
     const row = await this.#read('answered', (store) => store.get(item.lease_id));
     const body = { ...item.body, supersedes: item.isChange ? (row?.answer_id ?? null) : null };
     const reply = await request('PUT', `/api/v1/leases/${item.lease_id}/answer`, body);
+    if (typeof reply.answer_id !== 'string') throw notOurs(); // taken for stored only where the server says so
     await this.#acknowledge(item, row, reply.answer_id);
     this.#tell('saved', { stored_at: reply.stored_at, lease_id: item.lease_id });
   }
 
-  #acknowledge(item, row, answerId) {
+  /** @param {string} [word] that stands, where it is not the one that was sent */
+  #acknowledge(item, row, answerId, word = null) {
     return this.#write(['answered', 'unsent'], (transaction) => {
       const answered = transaction.objectStore('answered');
       const reading = answered.get(item.lease_id);
       reading.onsuccess = () => {
-        if (reading.result ?? row) answered.put({ ...(reading.result ?? row), answer_id: answerId ?? null });
+        const known = reading.result ?? row;
+        if (known) answered.put({ ...known, answer: word ?? known.answer, answer_id: answerId ?? null });
         transaction.objectStore('unsent').delete(item.key);
       };
     });
@@ -217,11 +227,12 @@ export class Outbox extends EventTarget {
   async #giveUp(item, problem) {
     const row = await this.#read('answered', (store) => store.get(item.lease_id));
     const isDecided = problem.status === 409 || problem.status === 410;
-    const standing = isDecided ? (problem.body?.existing?.answer_id ?? row?.answer_id) : null;
-    if (standing) await this.#acknowledge(item, row, standing);
+    const existing = problem.body.existing;
+    const standing = isDecided ? (existing?.answer_id ?? row?.answer_id) : null;
+    if (standing) await this.#acknowledge(item, row, standing, existing?.answer);
     else await this.#forget(item);
     const lease = row?.lease ?? { lease_id: item.lease_id };
-    this.#tell('refused', { message: problem.message, lease, isForgotten: !standing });
+    this.#tell('refused', { message: problem.message, lease, standing: standing ? existing?.answer : null });
   }
 
   #forget(item) {

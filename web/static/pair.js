@@ -3,8 +3,9 @@
 // Inside it the page writes two <canvas data-side="left|right">, and whichever controls it wants:
 // buttons with data-do="toggle|back|forward|slower|faster|restart", an <input type="range"
 // data-do="scrub">, an <output data-show="speed|frame">. With attributes `left` and `right`
-// (addresses of clips) it loads them itself once it is in view, and lets go of them when it leaves
-// the page; where that fails it says so, and tries again when it is played or comes into view again.
+// (addresses of clips) it loads them itself while it is in view, and lets go of them when it is not, as
+// decoded ones are large; where that fails it says so, and tries again when it is played or comes into
+// view again.
 // With `still` it waits to be played.
 import { bothClips, loadClip } from './clip.js';
 
@@ -102,13 +103,23 @@ export class StairPair extends HTMLElement {
     };
   }
 
-  /** Puts two clips on, at their first frame, and plays them, once nothing lies over them, unless stillness is wanted. */
-  show(left, right) {
+  /** For `show`, so that a pair that comes back goes on counting. */
+  get watch() {
+    this.#countTime();
+    return { ...this.#watch };
+  }
+
+  /**
+   * Puts two clips on, at their first frame, and plays them, once nothing lies over them, unless stillness is wanted.
+   *
+   * @param {object} [watch] of the pair when it was on before
+   */
+  show(left, right, watch = emptyWatch()) {
     this.#clips = { left, right };
     this.#drawn = { left: -1, right: -1 };
     this.#seconds = 0;
     this.#held = 0;
-    this.#watch = emptyWatch();
+    this.#watch = { ...watch, isDrawn: false, isStarted: false };
     for (const side of ['left', 'right']) {
       const canvas = this.#canvas(side);
       const clip = this.#clips[side];
@@ -292,16 +303,19 @@ export class StairPair extends HTMLElement {
     const scrub = this.querySelector('[data-do="scrub"]');
     if (scrub && !scrub.matches(':active')) scrub.value = String(this.frame);
     scrub?.setAttribute('aria-valuetext', `frame ${this.frame + 1} of ${n}`);
-    const toggle = this.querySelector('[data-do="toggle"]');
-    if (toggle && toggle.getAttribute('aria-label') !== (this.#playing ? 'Pause' : 'Play')) {
-      toggle.setAttribute('aria-label', this.#playing ? 'Pause' : 'Play');
-    }
-    this.toggleAttribute('playing', this.#playing);
+    this.#tellPlaying();
     const speed = this.querySelector('[data-show="speed"]');
     if (speed) speed.textContent = `${this.#speed}×`;
     const frame = this.querySelector('[data-show="frame"]');
     if (frame) frame.textContent = `${this.frame + 1} / ${n}`;
     this.dispatchEvent(new CustomEvent('change'));
+  }
+
+  #tellPlaying() {
+    const toggle = this.querySelector('[data-do="toggle"]');
+    const label = this.#playing ? 'Pause' : 'Play';
+    if (toggle && toggle.getAttribute('aria-label') !== label) toggle.setAttribute('aria-label', label);
+    this.toggleAttribute('playing', this.#playing);
   }
 
   #visibilityChanged = () => {
@@ -328,9 +342,9 @@ export class StairPair extends HTMLElement {
   }
 
   #loadWhenSeen() {
-    this.#observer = new IntersectionObserver(([entry]) => {
-      if (entry.isIntersecting) this.#load();
-      else if (this.#playing && this.hasAttribute('loaded')) this.toggle();
+    this.#observer = new IntersectionObserver((entries) => {
+      if (entries.at(-1).isIntersecting) this.#load();
+      else if (this.#loading) this.#letGo();
     });
     this.#observer.observe(this);
   }
@@ -369,12 +383,13 @@ export class StairPair extends HTMLElement {
     this.append(words);
   }
 
-  /** Gives the memory of its own clips back, those on their way too. */
+  /** Gives the memory of its own clips back, those on their way too; the last frames stay to be seen. */
   #letGo() {
     this.#loading.abort();
     this.#loading = null;
     const { left, right } = this.#clips;
     this.clear();
+    this.#tellPlaying();
     for (const clip of [left, right]) clip?.close();
     this.removeAttribute('loaded');
   }

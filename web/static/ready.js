@@ -6,21 +6,25 @@ import { BrokenClip, bothClips, loadClip } from './clip.js';
 const N_LEASES = 3;
 const HEARTBEAT_MS = 60_000;
 const RETRY_MS = 1_000;
+/** So many tries may fail before it is worth a word. */
+const QUIET_TRIES = 3;
 
 /**
  * Fetches and decodes both clips of a lease; tries again while the network is away.
  *
- * @param {AbortSignal} [cancelled] nobody waits for the pair any more
+ * @param {{cancelled?: AbortSignal, late?: (reason: Error) => void}} [watcher] `cancelled` when nobody waits
+ *   for the pair any more; `late` is told of each try that failed once several have
  * @returns {Promise<{lease: object, left: Clip, right: Clip}>} rejects with BrokenClip, or once cancelled
  */
-export async function preparePair(lease, cancelled = null) {
-  for (;;) {
+export async function preparePair(lease, { cancelled = null, late = () => {} } = {}) {
+  for (let n = 1; ; n += 1) {
     const loading = [lease.left, lease.right].map((side) => loadClip(side.clip, side, cancelled));
     try {
       const [left, right] = await bothClips(loading);
       return { lease, left, right };
     } catch (reason) {
       if (reason instanceof BrokenClip || cancelled?.aborted) throw reason;
+      if (n >= QUIET_TRIES) late(reason);
     }
     await new Promise((resolve) => setTimeout(resolve, RETRY_MS));
   }
@@ -34,7 +38,8 @@ export function releasePair(pair) {
 
 /**
  * The queue of prepared pairs. Fires `state` (the server's words about the run) after each
- * question to the server, `ready` when a pair was prepared, `broken` ({lease, reason}), and
+ * question to the server, `ready` when a pair was prepared, `late` ({reason}) while the next one's
+ * clips do not come, `broken` ({lease, reason}), `gone` ({lease}) when somebody else has it now, and
  * `offline` when the server did not reply.
  */
 export class ReadyPairs extends EventTarget {
@@ -58,9 +63,10 @@ export class ReadyPairs extends EventTarget {
     setInterval(() => this.#heartbeat(), HEARTBEAT_MS);
   }
 
-  /** Number of pairs that can be shown at once. */
-  get nReady() {
-    return this.#entries.filter((entry) => entry.pair).length;
+  /** Whether `take` gives a pair: the next in the server's order, whichever others are decoded before it. */
+  get isNextReady() {
+    this.dropTaken();
+    return Boolean(this.#entries[0]?.pair);
   }
 
   /** Whether pairs are on their way. */
@@ -70,9 +76,7 @@ export class ReadyPairs extends EventTarget {
 
   /** Takes the next pair, in the server's order, or null when it is not decoded yet. */
   take() {
-    this.dropTaken();
-    if (!this.#entries[0]?.pair) return null;
-    return this.#entries.shift().pair;
+    return this.isNextReady ? this.#entries.shift().pair : null;
   }
 
   /** Forgets leases that are settled or on the page; called whenever one was settled. */
@@ -82,7 +86,12 @@ export class ReadyPairs extends EventTarget {
 
   #drop(entry) {
     this.#entries = this.#entries.filter((kept) => kept !== entry);
+    entry.leaving.abort();
     releasePair(entry.pair);
+  }
+
+  #late(entry, reason) {
+    if (entry === this.#entries[0]) this.#tell('late', { reason });
   }
 
   /**
@@ -123,7 +132,7 @@ export class ReadyPairs extends EventTarget {
     for (const lease of reply.leases) {
       const isKnown = this.#entries.some((entry) => entry.lease.lease_id === lease.lease_id);
       if (isKnown || this.#isTaken(lease)) continue;
-      this.#prepare({ lease, pair: null });
+      this.#prepare({ lease, pair: null, leaving: new AbortController() });
     }
     this.#tell('state', reply);
   }
@@ -131,7 +140,7 @@ export class ReadyPairs extends EventTarget {
   async #prepare(entry) {
     this.#entries.push(entry);
     try {
-      entry.pair = await preparePair(entry.lease);
+      entry.pair = await preparePair(entry.lease, { cancelled: entry.leaving.signal, late: (reason) => this.#late(entry, reason) });
     } catch (reason) {
       if (!this.#entries.includes(entry)) return;
       this.#drop(entry);
@@ -146,8 +155,8 @@ export class ReadyPairs extends EventTarget {
     if (document.visibilityState !== 'visible') return;
     const held = [...this.#shown(), ...this.#entries.map((entry) => entry.lease)];
     for (const lease of held.filter((candidate) => !this.#isSettled(candidate))) {
-      await request('POST', `/api/v1/leases/${lease.lease_id}/heartbeat`).catch(() => {
-        // A lease that is gone is noticed when it is answered; the answer is kept aside, not lost.
+      await request('POST', `/api/v1/leases/${lease.lease_id}/heartbeat`).catch((reason) => {
+        if (reason instanceof Problem && reason.status === 410) this.#tell('gone', { lease });
       });
     }
   }

@@ -29,12 +29,17 @@ let isDrawing = false;
 function start() {
   draw();
   listen();
+  document.addEventListener('visibilitychange', drawSoon);
   tellState();
   setInterval(tellState, 5_000);
 }
 
+/** The answers of a round, to look at again. */
+const answersOf = (mark) => `/labels?run=${run}&round=${mark.y + 1}`;
+
 function draw() {
   isDrawing = false;
+  let isFirst = true; // the same marks are on every panel; the Tab key stops at them once
   const xMax = Number(page.dataset.totalSteps) || curves.total_steps;
   for (const panel of PANELS) {
     const series = panel.lines.map(([name, key, isQuiet]) => ({ name, points: curves[key], isQuiet }));
@@ -46,7 +51,9 @@ function draw() {
     figure.querySelector('[data-show="now"]').textContent = now ? panel.format(now.y) : '–';
     if (isEmpty) continue;
     if (panel.id === 'success') setText('success-now', percent(now.y));
-    drawCurve(figure.querySelector('svg'), { series, range: panel.range, format: panel.format, xMax, marks: curves.sessions });
+    const marks = { marks: curves.sessions, href: answersOf, isTabbed: isFirst };
+    drawCurve(figure.querySelector('svg'), { series, range: panel.range, format: panel.format, xMax, ...marks });
+    isFirst = false;
   }
 }
 
@@ -56,9 +63,12 @@ function drawSoon() {
   requestAnimationFrame(draw);
 }
 
+/** Until the events are asked for again, where somebody on the way has refused them. */
+const REFUSED_MS = 3_000;
+
 /**
  * The server's events, from the first one of the run; after a lost connection the browser asks
- * again by itself from the last one it has seen.
+ * again by itself from the last one it has seen. What comes twice is taken in once.
  */
 function listen() {
   const source = new EventSource(`/api/v1/runs/${run}/events`);
@@ -80,8 +90,11 @@ function listen() {
     source.addEventListener(kind, take);
   }
   source.onopen = () => page.removeAttribute('data-offline');
-  source.onerror = () => page.setAttribute('data-offline', '');
-  document.addEventListener('visibilitychange', drawSoon);
+  source.onerror = () => {
+    page.setAttribute('data-offline', '');
+    // Any reply but the events, as a proxy's while the server starts again, ends it for the browser.
+    if (source.readyState === EventSource.CLOSED) setTimeout(listen, REFUSED_MS);
+  };
 }
 
 let stateTimer = 0;

@@ -9,12 +9,15 @@ const HEADINGS = {
   offline: 'No connection to the server',
   stranger: 'Who is answering?',
   keepless: 'Answers cannot be kept here',
+  undecodable: 'The clips cannot be shown here',
+  late: 'The next pair is late',
   drawing: 'Drawing the next clips',
   waiting: 'The agent is practising',
   held: 'Others are on the remaining pairs',
   done: 'All done — thank you',
   paused: 'Paused for now',
   failed: 'This run cannot go on',
+  over: 'This study takes no answers now',
 };
 
 /** The curve is asked for at most this often. */
@@ -49,7 +52,7 @@ export class WaitingCard {
     const hasProgress = typeof progress === 'number' && state.kind === 'waiting';
     $('waiting-bar').hidden = !hasProgress;
     if (hasProgress) $('waiting-bar').value = progress;
-    $('to-run').hidden = isLast || !['done', 'failed', 'paused'].includes(state.kind);
+    $('to-run').hidden = isLast || !['done', 'failed', 'over', 'paused'].includes(state.kind);
     if (this.#isStudy) this.#offerWayOn(isLast);
     this.#tellCurve(state.kind);
   }

@@ -2,7 +2,11 @@
 
 use utoipa::OpenApi;
 
+use self::description::Shared;
+use crate::problem::Problem;
+
 pub mod clips;
+mod description;
 pub mod events;
 pub mod health;
 pub mod labelers;
@@ -14,12 +18,27 @@ pub mod seats;
 pub mod studies;
 pub mod tasks;
 
-/// OpenAPI 3.1, generated from the handlers.
+/// OpenAPI 3.1, generated from the handlers. They say what is their own; what all of them have in
+/// common is added in `description.rs`.
 #[derive(OpenApi)]
 #[openapi(
     info(
         title = "STAIR",
         description = "Train agents from human preferences. Problems are RFC 9457."
+    ),
+    modifiers(&Shared),
+    components(schemas(Problem)),
+    tags(
+        (name = "tasks", description = "What can be learned, and by which methods."),
+        (name = "runs", description = "Start agents and command them."),
+        (name = "leases", description = "Questions to whoever answers, and their answers."),
+        (name = "queries", description = "Ground truth for programs that answer."),
+        (name = "clips", description = "Pictures of segments."),
+        (name = "events", description = "What a run says, live and from the start."),
+        (name = "labels", description = "All answers, for statistics elsewhere."),
+        (name = "labelers", description = "Who answers."),
+        (name = "studies", description = "The same pairs for invited people."),
+        (name = "health", description = "For whoever watches the server."),
     ),
     paths(
         tasks::list,

@@ -96,7 +96,7 @@ where
                     });
                 }
                 Some(bearer) if bearer.kind == TokenKind::Access => {}
-                _ => return Err(Problem::who_are_you()),
+                _ => return Err(Problem::token_unknown()),
             }
         }
         match labeler(&app, &parts.headers).await? {
@@ -147,6 +147,8 @@ pub enum Cookie {
     Labeler,
     /// Of a browser that may use a server on a network.
     Access,
+    /// Of any browser that keeps cookies; says nothing else.
+    Kept,
 }
 
 impl Cookie {
@@ -162,10 +164,10 @@ impl Cookie {
     }
 
     /// What `Set-Cookie` says in the reply to a request: for a year, out of the reach of scripts
-    /// and of other sites.
+    /// and of other sites, but for a link there that leads here.
     pub fn set(self, headers: &HeaderMap, secret: &Secret) -> String {
         format!(
-            "{}={}; Path=/; Max-Age=31536000; HttpOnly; SameSite=Strict",
+            "{}={}; Path=/; Max-Age=31536000; HttpOnly; SameSite=Lax",
             self.name(headers),
             secret.reveal()
         )
@@ -183,6 +185,7 @@ impl Cookie {
         match self {
             Self::Labeler => "stair_labeler",
             Self::Access => "stair_access",
+            Self::Kept => "stair_kept",
         }
     }
 }

@@ -46,7 +46,12 @@ pub async fn number(request: Request, next: Next) -> Response {
         }
         .into_response();
         for (name, value) in response.headers() {
-            if name == header::SET_COOKIE || name == header::RETRY_AFTER {
+            let kept = [
+                header::SET_COOKIE,
+                header::RETRY_AFTER,
+                header::CONTENT_RANGE,
+            ];
+            if kept.contains(name) {
                 told.headers_mut().insert(name, value.clone());
             }
         }

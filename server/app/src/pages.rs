@@ -2,12 +2,14 @@
 //!
 //! Pages work with forms and links; scripts add keys, preloading and live curves.
 
+pub mod api;
 pub mod experiment;
 pub mod experiments;
 pub mod guidance;
 pub mod home;
 pub mod join;
 pub mod label;
+pub mod labels;
 mod markdown;
 pub mod problem;
 pub mod run;

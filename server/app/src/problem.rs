@@ -12,9 +12,8 @@ use crate::live::LiveError;
 
 mod rejection;
 
-/// A problem as clients receive it, `application/problem+json`.
-///
-/// Constructors are named by meaning; `type` is a stable name below `/problems/`.
+// Constructors are named by meaning.
+/// What went wrong, `application/problem+json`.
 #[derive(Debug, Clone, Serialize, utoipa::ToSchema)]
 pub struct Problem {
     /// Stable name of the kind of problem: `/problems/run-not-found`.
@@ -164,6 +163,17 @@ impl Problem {
         )
     }
 
+    /// 401: a token that is no program's, or that was never given out here.
+    pub fn token_unknown() -> Self {
+        let detail = "This token is not one of a teacher on this server: it was mistyped, or made elsewhere. POST /api/v1/runs/{run}/teacher-tokens makes one.";
+        Self::new(
+            StatusCode::UNAUTHORIZED,
+            "/problems/token-unknown",
+            "This token is not known here",
+            detail,
+        )
+    }
+
     /// 401: the server listens on more than its own machine, and the request brought no token.
     pub fn token_needed() -> Self {
         let detail = "This server needs a token: open /enter?token=… once, or send it as Authorization: Bearer.";
@@ -206,6 +216,16 @@ impl Problem {
             "/problems/clip-gone",
             "This clip is gone",
             detail,
+        )
+    }
+
+    /// 416: a part that a clip does not have.
+    pub fn no_such_range() -> Self {
+        Self::new(
+            StatusCode::RANGE_NOT_SATISFIABLE,
+            "/problems/no-such-range",
+            "The clip has no such part",
+            "Ask for one range within the clip's length, which `Content-Range` tells.",
         )
     }
 

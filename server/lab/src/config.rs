@@ -20,7 +20,7 @@ mod presets;
 
 pub(crate) use layers::invalid;
 use layers::parse_layer;
-pub use layers::{Layers, plainly};
+pub use layers::{Layers, identity, plainly};
 pub use presets::PRESETS;
 pub(crate) use presets::preset_names;
 

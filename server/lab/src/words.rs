@@ -13,6 +13,11 @@ pub fn thousands(n: u64) -> String {
     text
 }
 
+/// A number with what it counts: `1 run`, `2 runs`.
+pub fn counted(n: u64, one: &str, many: &str) -> String {
+    format!("{n} {}", if n == 1 { one } else { many })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -21,5 +26,11 @@ mod tests {
     fn long_numbers_are_told_by_thousands() {
         let words = [0, 999, 1_000, 123_456, 2_010_000].map(thousands).join(" ");
         assert_eq!(words, "0 999 1,000 123,456 2,010,000");
+    }
+
+    #[test]
+    fn one_of_a_kind_is_told_as_one() {
+        let words = [0, 1, 2].map(|n| counted(n, "query", "queries")).join(", ");
+        assert_eq!(words, "0 queries, 1 query, 2 queries");
     }
 }

@@ -297,7 +297,7 @@ async fn keep_aside(
     });
     let added = sqlx::query(
         "insert into late_answer (lease_id, labeler_id, pressed, body, received_at_ms) values (?, ?, ?, ?, ?)
-         on conflict do nothing",
+         on conflict (lease_id, body) do nothing",
     )
     .bind(&leased.id)
     .bind(labeler.0)

@@ -10,6 +10,10 @@ use crate::store::Store;
 use crate::study::StudyId;
 use crate::time::rfc3339;
 
+mod filter;
+
+pub use filter::{FoundLabel, FoundLabels, LabelChoices, LabelFilter, LabelFlag, LabelsFrom};
+
 /// One answer with all that belongs to it; the columns of every export, in this order.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -171,25 +175,37 @@ impl Label {
     ];
 }
 
-const LABELS: &str = "select answer.rowid as place, answer.*, run.task, run.seed, query.id as query_id, query.session, query.position,
-        iif(run.study_id is null, run.method, iif(study.state = 'closed', study_item.method, null)) as method,
-        labeler.name as labeler, query.first_clip, query.second_clip, query.disagreement, query.stage_gap,
-        a.episode as first_episode, a.start as first_start, a.len as segment_len,
-        b.episode as second_episode, b.start as second_start,
-        not exists (select 1 from answer as later where later.supersedes = answer.id) as is_current,
-        run.study_id, study_turn.item_id, study_turn.role, study_item.expects
-    from answer
+/// The method that chose a query, where it is told: in a study once that is closed.
+const TOLD_METHOD: &str =
+    "iif(run.study_id is null, run.method, iif(study.state = 'closed', study_item.method, null))";
+
+/// Answers and what belongs to them, one row each.
+const TABLES: &str = "answer
     join run on run.id = answer.run_id
     join question on question.id = answer.question_id
     join query on query.id = question.query_id
-    join query_segment as a on a.query_id = query.id and a.which = 'first'
-    join query_segment as b on b.query_id = query.id and b.which = 'second'
     join labeler on labeler.id = answer.labeler_id
     left join study on study.id = run.study_id
     left join study_turn on study_turn.query_id = query.id
-    left join study_item on study_item.id = study_turn.item_id
-    where (answer.run_id = ?1 or run.study_id = ?2) and answer.rowid > ?3
-    order by answer.rowid limit ?4";
+    left join study_item on study_item.id = study_turn.item_id";
+
+/// The columns of every [`Label`], its place in the order of storing, and whether its method is
+/// kept from whoever looks.
+fn select() -> String {
+    format!(
+        "select answer.rowid as place, answer.*, run.task, run.seed, query.id as query_id, query.session, query.position,
+            {TOLD_METHOD} as method,
+            labeler.name as labeler, query.first_clip, query.second_clip, query.disagreement, query.stage_gap,
+            a.episode as first_episode, a.start as first_start, a.len as segment_len,
+            b.episode as second_episode, b.start as second_start,
+            not exists (select 1 from answer as later where later.supersedes = answer.id) as is_current,
+            run.study_id, study_turn.item_id, study_turn.role, study_item.expects,
+            coalesce(study.state != 'closed', 0) as is_blinded
+        from {TABLES}
+        join query_segment as a on a.query_id = query.id and a.which = 'first'
+        join query_segment as b on b.query_id = query.id and b.which = 'second'"
+    )
+}
 
 fn read(row: &SqliteRow) -> Result<Label, StoreError> {
     Ok(Label {
@@ -269,7 +285,9 @@ impl Store {
             LabelsOf::Run(run) => (Some(run.0), None),
             LabelsOf::Study(study) => (None, Some(study.0)),
         };
-        let rows = sqlx::query(LABELS)
+        let page = "where (answer.run_id = ?1 or run.study_id = ?2) and answer.rowid > ?3
+            order by answer.rowid limit ?4";
+        let rows = sqlx::query(sqlx::AssertSqlSafe(format!("{} {page}", select())))
             .bind(run)
             .bind(study)
             .bind(after)

@@ -22,6 +22,7 @@ mod store;
 mod study;
 mod time;
 mod token;
+mod unused;
 mod writer;
 
 pub use answer::{NewAnswer, StoredAnswer, Timing};
@@ -29,7 +30,10 @@ pub use clip::{ClipInfo, NewClip};
 pub use demonstration::{DemonstrationRow, NewDemonstration};
 pub use error::{LinkTrouble, StoreError};
 pub use event::EventRow;
-pub use label::{AnsweredPair, ColumnKind, Label, LabelPage, LabelsOf};
+pub use label::{
+    AnsweredPair, ColumnKind, FoundLabel, FoundLabels, Label, LabelChoices, LabelFilter, LabelFlag,
+    LabelPage, LabelsFrom, LabelsOf,
+};
 pub use labeler::{Labeler, LabelerId};
 pub use lease::{Lease, LeaseClip, Practice, Queue};
 pub use pressed::Pressed;
@@ -43,3 +47,4 @@ pub use study::{
 };
 pub use time::{now_ms, rfc3339};
 pub use token::{Bearer, TokenKind};
+pub use unused::{BY_THE_PAGE, PassedOver};

@@ -198,10 +198,11 @@ fn at_opening(path: &Path, error: StoreError) -> StoreError {
 
 /// Reads back what durability and integrity rest on: SQLite ignores a setting that it cannot take.
 async fn check_settings(connection: &mut SqliteConnection) -> Result<(), StoreError> {
-    const NEEDED: [(&str, &str, &str); 3] = [
+    const NEEDED: [(&str, &str, &str); 4] = [
         ("journal_mode", "pragma journal_mode", "wal"),
         ("synchronous", "pragma synchronous", "2"),
         ("foreign_keys", "pragma foreign_keys", "1"),
+        ("busy_timeout", "pragma busy_timeout", "5000"),
     ];
     for (name, pragma, wanted) in NEEDED {
         let row = sqlx::query(pragma).fetch_one(&mut *connection).await?;

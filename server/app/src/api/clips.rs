@@ -19,15 +19,18 @@ use crate::state::AppState;
 /// # Errors
 /// An unknown clip; a clip whose bytes are gone from the server's data folder, which asking again
 /// does not bring back.
-#[utoipa::path(get, path = "/api/v1/clips/{name}", tag = "clips",
-    params(("name" = String, Path, description = "64 hexadecimal digits and .mp4")),
-    responses((status = 200, content_type = "video/mp4"), (status = 206, content_type = "video/mp4"),
-        (status = 404, body = Problem),
-        (status = 410, body = Problem, description = "/problems/clip-gone: the clip is known and its bytes are gone")))]
+#[utoipa::path(get, path = "/api/v1/clips/{name}", tag = "clips", operation_id = "readClip",
+    params(("name" = String, Path, description = "64 hexadecimal digits and `.mp4`."),
+        ("Range" = Option<String>, Header, description = "The part that is wanted: `bytes=0-1023`.", nullable = false),
+        ("If-None-Match" = Option<String>, Header, description = "The `ETag` of a copy that is there already.", nullable = false)),
+    security((), ("accessToken" = []), ("accessCookie" = []), ("teacherToken" = []), ("labelerCookie" = [])),
+    responses((status = 200, content_type = "video/mp4"), (status = 206, content_type = "video/mp4"), (status = 304),
+        (status = 410, description = "The clip is known and its bytes are gone; asking again does not bring them back."),
+        (status = 416, description = "The range lies outside the clip, or is more than one.")))]
 pub async fn file(
     State(app): State<AppState>,
     Path(name): Path<String>,
-    request: Request,
+    mut request: Request,
 ) -> Result<Response, Problem> {
     let sha256 = name.strip_suffix(".mp4").unwrap_or(&name);
     let (clip, path) = app.store.clip(sha256).await?;
@@ -36,15 +39,25 @@ pub async fn file(
     if request.headers().get(header::IF_NONE_MATCH) == Some(&tag) {
         return Ok((StatusCode::NOT_MODIFIED, [(header::ETAG, tag)]).into_response());
     }
+    // A clip is named by its bytes: when its file was written says nothing about it.
+    request.headers_mut().remove(header::IF_MODIFIED_SINCE);
+    request.headers_mut().remove(header::IF_UNMODIFIED_SINCE);
     let Ok(served) = ServeFile::new(path).oneshot(request).await;
     let mut response = served.into_response();
-    if response.status().is_client_error() && response.status() != StatusCode::RANGE_NOT_SATISFIABLE
-    {
+    if response.status() == StatusCode::NOT_FOUND {
         tracing::error!(
             "the bytes of clip {} are gone from the data folder",
             clip.sha256
         );
         return Err(Problem::clip_gone());
+    }
+    if response.status() == StatusCode::RANGE_NOT_SATISFIABLE {
+        let length = response.headers_mut().remove(header::CONTENT_RANGE);
+        let mut refusal = Problem::no_such_range().into_response();
+        refusal
+            .headers_mut()
+            .extend(length.map(|length| (header::CONTENT_RANGE, length)));
+        return Ok(refusal);
     }
     let headers = response.headers_mut();
     headers.insert(
@@ -119,8 +132,8 @@ pub struct BadView {
 ///
 /// # Errors
 /// An unknown run.
-#[utoipa::path(get, path = "/api/v1/runs/{id}/clips", tag = "clips", params(("id" = i64, Path)),
-    responses((status = 200, body = ClipsView), (status = 404, body = Problem)))]
+#[utoipa::path(get, path = "/api/v1/runs/{id}/clips", tag = "clips", operation_id = "listRunClips",
+    params(("id" = i64, Path)), responses((status = 200, body = ClipsView)))]
 pub async fn of_run(
     State(app): State<AppState>,
     Run(run): Run,

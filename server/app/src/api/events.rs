@@ -29,13 +29,17 @@ const CURVES: &[&str] = &[
 /// Events read at once.
 const PAGE: u32 = 500;
 
-/// Server-sent events: everything that is in the run's log above `Last-Event-ID` (from the start
-/// without one), then what happens, without gaps. Passing things (`phase`) have no id.
+/// Follows a run by server-sent events.
+///
+/// First comes everything that is in the run's log above `Last-Event-ID` (from the start without
+/// one), then what happens, without gaps. Passing things (`phase`) have no id.
 ///
 /// # Errors
 /// An unknown run.
-#[utoipa::path(get, path = "/api/v1/runs/{id}/events", tag = "events", params(("id" = i64, Path)),
-    responses((status = 200, content_type = "text/event-stream"), (status = 404, body = Problem)))]
+#[utoipa::path(get, path = "/api/v1/runs/{id}/events", tag = "events", operation_id = "followRun",
+    params(("id" = i64, Path),
+        ("Last-Event-ID" = Option<u64>, Header, description = "The newest event that was received.", nullable = false)),
+    responses((status = 200, content_type = "text/event-stream", description = "Events, until the reader goes away.")))]
 pub async fn follow(State(app): State<AppState>, Run(run): Run, headers: HeaderMap) -> Response {
     let last = headers
         .get("last-event-id")
@@ -110,8 +114,8 @@ async fn send_log(
 ///
 /// # Errors
 /// An unknown run.
-#[utoipa::path(get, path = "/api/v1/runs/{id}/metrics", tag = "events", params(("id" = i64, Path)),
-    responses((status = 200, body = [Object]), (status = 404, body = Problem)))]
+#[utoipa::path(get, path = "/api/v1/runs/{id}/metrics", tag = "events", operation_id = "readRunMetrics",
+    params(("id" = i64, Path)), responses((status = 200, body = [Object])))]
 pub async fn metrics(State(app): State<AppState>, Run(run): Run) -> Result<Response, Problem> {
     let rows = app.store.events_of(run.id, CURVES).await?;
     let rows: Vec<String> = rows.into_iter().map(|row| row.data).collect();

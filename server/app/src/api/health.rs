@@ -9,7 +9,8 @@ use crate::problem::Problem;
 use crate::state::AppState;
 
 /// Whether the process answers.
-#[utoipa::path(get, path = "/livez", tag = "health", responses((status = 200, body = String)))]
+#[utoipa::path(get, path = "/livez", tag = "health", operation_id = "checkAlive", security(()),
+    responses((status = 200, body = String, description = "It does.")))]
 pub async fn livez() -> &'static str {
     "ok\n"
 }
@@ -18,7 +19,9 @@ pub async fn livez() -> &'static str {
 ///
 /// # Errors
 /// The database cannot be read or written.
-#[utoipa::path(get, path = "/readyz", tag = "health", responses((status = 200, body = String), (status = 507, body = Problem)))]
+#[utoipa::path(get, path = "/readyz", tag = "health", operation_id = "checkReady",
+    responses((status = 200, body = String, description = "They can."),
+        (status = 507, description = "The disk is full or cannot be written.")))]
 pub async fn readyz(State(app): State<AppState>) -> Result<&'static str, Problem> {
     app.store.check().await?;
     Ok("ok\n")
@@ -28,7 +31,8 @@ pub async fn readyz(State(app): State<AppState>) -> Result<&'static str, Problem
 ///
 /// # Errors
 /// The database cannot be read.
-#[utoipa::path(get, path = "/metrics", tag = "health", responses((status = 200, body = String)))]
+#[utoipa::path(get, path = "/metrics", tag = "health", operation_id = "readMetrics",
+    responses((status = 200, body = String)))]
 pub async fn metrics(State(app): State<AppState>) -> Result<Response, Problem> {
     use std::fmt::Write as _;
     let mut text = String::from("# TYPE stair_http_requests_total counter\n");

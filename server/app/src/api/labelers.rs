@@ -33,8 +33,9 @@ pub struct LabelerView {
 ///
 /// # Errors
 /// A name that is none, or that the server keeps for itself.
-#[utoipa::path(post, path = "/api/v1/labelers", tag = "labelers", request_body = NewLabeler,
-    responses((status = 201, body = LabelerView), (status = 422, body = Problem)))]
+#[utoipa::path(post, path = "/api/v1/labelers", tag = "labelers", operation_id = "createLabeler", request_body = NewLabeler,
+    responses((status = 201, body = LabelerView, headers(("Set-Cookie" = String, description = "The labeler's cookie."))),
+        (status = 422, description = "A name of no or more than 80 letters, or one that the server keeps for itself.")))]
 pub async fn create(
     State(app): State<AppState>,
     headers: HeaderMap,

@@ -19,6 +19,7 @@ const AHEAD: usize = 2;
 
 /// `?format=csv|jsonl|parquet`
 #[derive(Deserialize, utoipa::IntoParams)]
+#[into_params(parameter_in = Query)]
 pub struct Format {
     /// `csv` (unless said otherwise), `jsonl` or `parquet`; the same rows and columns.
     #[serde(default)]
@@ -29,8 +30,11 @@ pub struct Format {
 ///
 /// # Errors
 /// An unknown run or format.
-#[utoipa::path(get, path = "/api/v1/runs/{id}/labels", tag = "labels", params(("id" = i64, Path), Format),
-    responses((status = 200, content_type = "text/csv"), (status = 404, body = Problem), (status = 422, body = Problem)))]
+#[utoipa::path(get, path = "/api/v1/runs/{id}/labels", tag = "labels", operation_id = "exportRunLabels",
+    params(("id" = i64, Path), Format),
+    responses((status = 200, description = "The table, as a file to keep.",
+            content(("text/csv"), ("application/x-ndjson"), ("application/vnd.apache.parquet"))),
+        (status = 422, description = "An unknown format.")))]
 pub async fn export(
     State(app): State<AppState>,
     Run(run): Run,

@@ -127,9 +127,12 @@ pub struct ProgressView {
 /// # Errors
 /// An unknown run; nobody has said who answers; questions that are another's; a study that is not
 /// open.
-#[utoipa::path(post, path = "/api/v1/runs/{id}/leases", tag = "leases", params(("id" = i64, Path)), request_body = LeaseRequest,
-    responses((status = 200, body = LeasesView), (status = 401, body = Problem),
-        (status = 403, body = Problem), (status = 404, body = Problem), (status = 409, body = Problem)))]
+#[utoipa::path(post, path = "/api/v1/runs/{id}/leases", tag = "leases", operation_id = "createLeases",
+    params(("id" = i64, Path)), request_body = LeaseRequest,
+    security(("teacherToken" = []), ("labelerCookie" = [])),
+    responses((status = 200, body = LeasesView),
+        (status = 403, description = "Questions that are another labeler's, or of another run than the token's."),
+        (status = 409, description = "The study is not open.")))]
 pub async fn create(
     State(app): State<AppState>,
     who: Answerer,
@@ -162,8 +165,10 @@ pub async fn create(
 ///
 /// # Errors
 /// An unknown lease, another labeler's, or one that somebody else has taken.
-#[utoipa::path(post, path = "/api/v1/leases/{id}/heartbeat", tag = "leases", params(("id" = String, Path)),
-    responses((status = 200, body = HeartbeatView), (status = 404, body = Problem), (status = 410, body = Problem)))]
+#[utoipa::path(post, path = "/api/v1/leases/{id}/heartbeat", tag = "leases", operation_id = "heartbeat",
+    params(("id" = String, Path)), security(("teacherToken" = []), ("labelerCookie" = [])),
+    responses((status = 200, body = HeartbeatView), (status = 403, description = "Another labeler's lease."),
+        (status = 410, description = "Somebody else has the question now.")))]
 pub async fn heartbeat(
     State(app): State<AppState>,
     who: Answerer,
@@ -239,17 +244,24 @@ pub struct AnswerView {
     stored_at: String,
 }
 
-/// Stores an answer, once however often it is sent. The reply comes after the commit.
+/// Stores an answer, once however often it is sent.
+///
+/// The reply comes after the commit.
 ///
 /// # Errors
 /// 403 another labeler's lease · 404 an unknown lease · 409 another answer exists, or the study
 /// takes none (kept aside) · 410 somebody else has the question, or its pair was skipped (kept
 /// aside) · 422 not an answer to this question, a skip without a reason, or an answer that cannot be
 /// replaced.
-#[utoipa::path(put, path = "/api/v1/leases/{id}/answer", tag = "leases", params(("id" = String, Path)), request_body = AnswerRequest,
-    responses((status = 201, body = AnswerView), (status = 200, body = AnswerView),
-        (status = 403, body = Problem), (status = 404, body = Problem),
-        (status = 409, body = Problem), (status = 410, body = Problem), (status = 422, body = Problem)))]
+#[utoipa::path(put, path = "/api/v1/leases/{id}/answer", tag = "leases", operation_id = "answer",
+    params(("id" = String, Path)), request_body = AnswerRequest,
+    security(("teacherToken" = []), ("labelerCookie" = [])),
+    responses((status = 201, body = AnswerView, description = "The answer is stored."),
+        (status = 200, body = AnswerView, description = "The same answer was stored before."),
+        (status = 403, description = "Another labeler's lease."),
+        (status = 409, description = "Another answer exists, which `existing` tells; or the study takes none, and this one is kept aside."),
+        (status = 410, description = "Somebody else has the question, or its pair was skipped; the answer is kept aside."),
+        (status = 422, description = "Not an answer to this question, a skip without a reason, or an answer that cannot be replaced.")))]
 pub async fn answer(
     State(app): State<AppState>,
     who: Answerer,

@@ -31,12 +31,15 @@ pub struct TaskRewardsView {
     typical_reward: Option<f64>,
 }
 
-/// Task rewards of a query. Only for a program with a teacher token of the query's run.
+/// Task rewards of a query.
+///
+/// Only for a program with a teacher token of the query's run.
 ///
 /// # Errors
 /// 403 for everybody else; 404 for an unknown query.
-#[utoipa::path(get, path = "/api/v1/queries/{id}/task-rewards", tag = "queries", params(("id" = i64, Path)),
-    responses((status = 200, body = TaskRewardsView), (status = 403, body = Problem), (status = 404, body = Problem)))]
+#[utoipa::path(get, path = "/api/v1/queries/{id}/task-rewards", tag = "queries", operation_id = "readTaskRewards",
+    params(("id" = i64, Path)), security(("teacherToken" = [])),
+    responses((status = 200, body = TaskRewardsView), (status = 403, description = "A labeler asks, or a teacher of another run.")))]
 pub async fn task_rewards(
     State(app): State<AppState>,
     who: Answerer,

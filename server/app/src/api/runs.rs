@@ -21,6 +21,7 @@ use crate::state::AppState;
 #[serde(deny_unknown_fields, default)]
 pub struct RunRequest {
     /// The task's name.
+    #[schema(required = true)]
     pub task: String,
     /// The method's name; STAIR unless said otherwise.
     pub method: Option<String>,
@@ -54,7 +55,7 @@ pub struct RunView {
     pub teacher: String,
     /// How irregular scripted teachers are to be in this run, as its settings `[teacher]` say; null
     /// where this version of the program cannot read them.
-    #[schema(value_type = Object)]
+    #[schema(value_type = Option<Object>)]
     pub teacher_settings: Option<TeacherSettings>,
     /// What it is doing.
     pub state: StateView,
@@ -101,7 +102,8 @@ impl RunView {
 ///
 /// # Errors
 /// The database cannot be read.
-#[utoipa::path(get, path = "/api/v1/runs", tag = "runs", responses((status = 200, body = [RunView])))]
+#[utoipa::path(get, path = "/api/v1/runs", tag = "runs", operation_id = "listRuns",
+    responses((status = 200, body = [RunView])))]
 pub async fn list(State(app): State<AppState>) -> Result<Json<Vec<RunView>>, Problem> {
     let mut views = Vec::new();
     for run in app.store.runs().await? {
@@ -114,8 +116,9 @@ pub async fn list(State(app): State<AppState>) -> Result<Json<Vec<RunView>>, Pro
 ///
 /// # Errors
 /// An unknown task, method, preset, teacher or setting, with the nearest right name.
-#[utoipa::path(post, path = "/api/v1/runs", tag = "runs", request_body = RunRequest,
-    responses((status = 201, body = RunView), (status = 422, body = Problem)))]
+#[utoipa::path(post, path = "/api/v1/runs", tag = "runs", operation_id = "createRun", request_body = RunRequest,
+    responses((status = 201, body = RunView, headers(("Location" = String, description = "Where the run is."))),
+        (status = 422, description = "An unknown task, method, preset, teacher or setting, with the nearest right name.")))]
 pub async fn create(
     State(app): State<AppState>,
     Body(request): Body<RunRequest>,
@@ -134,8 +137,9 @@ pub async fn create(
 ///
 /// # Errors
 /// An unknown run.
-#[utoipa::path(get, path = "/api/v1/runs/{id}", tag = "runs", params(("id" = i64, Path)),
-    responses((status = 200, body = RunView), (status = 404, body = Problem)))]
+#[utoipa::path(get, path = "/api/v1/runs/{id}", tag = "runs", operation_id = "readRun", params(("id" = i64, Path)),
+    security((), ("accessToken" = []), ("accessCookie" = []), ("teacherToken" = [])),
+    responses((status = 200, body = RunView)))]
 pub async fn read(State(app): State<AppState>, Run(run): Run) -> Result<Json<RunView>, Problem> {
     Ok(Json(view(&app, run).await?))
 }
@@ -144,8 +148,8 @@ pub async fn read(State(app): State<AppState>, Run(run): Run) -> Result<Json<Run
 ///
 /// # Errors
 /// A run that is not up.
-#[utoipa::path(post, path = "/api/v1/runs/{id}/pause", tag = "runs", params(("id" = i64, Path)),
-    responses((status = 202), (status = 409, body = Problem)))]
+#[utoipa::path(post, path = "/api/v1/runs/{id}/pause", tag = "runs", operation_id = "pauseRun", params(("id" = i64, Path)),
+    responses((status = 202), (status = 409, description = "The run is not up, or is stopping.")))]
 pub async fn pause(State(app): State<AppState>, Run(run): Run) -> Result<StatusCode, Problem> {
     app.live.pause(run.id)?;
     Ok(StatusCode::ACCEPTED)
@@ -155,8 +159,8 @@ pub async fn pause(State(app): State<AppState>, Run(run): Run) -> Result<StatusC
 ///
 /// # Errors
 /// A run that is finished.
-#[utoipa::path(post, path = "/api/v1/runs/{id}/resume", tag = "runs", params(("id" = i64, Path)),
-    responses((status = 202), (status = 409, body = Problem)))]
+#[utoipa::path(post, path = "/api/v1/runs/{id}/resume", tag = "runs", operation_id = "resumeRun", params(("id" = i64, Path)),
+    responses((status = 202), (status = 409, description = "The run is finished, has no agent, or is stopping.")))]
 pub async fn resume(State(app): State<AppState>, Run(run): Run) -> Result<StatusCode, Problem> {
     check_resumable(&run)?;
     app.live.resume(run.id)?;
@@ -185,8 +189,8 @@ pub fn check_resumable(run: &RunRow) -> Result<(), Problem> {
 ///
 /// # Errors
 /// A run that is not up.
-#[utoipa::path(post, path = "/api/v1/runs/{id}/stop", tag = "runs", params(("id" = i64, Path)),
-    responses((status = 202), (status = 409, body = Problem)))]
+#[utoipa::path(post, path = "/api/v1/runs/{id}/stop", tag = "runs", operation_id = "stopRun", params(("id" = i64, Path)),
+    responses((status = 202), (status = 409, description = "The run is not up.")))]
 pub async fn stop(State(app): State<AppState>, Run(run): Run) -> Result<StatusCode, Problem> {
     app.live.stop(run.id)?;
     Ok(StatusCode::ACCEPTED)
@@ -203,8 +207,9 @@ pub struct TokenView {
 ///
 /// # Errors
 /// A request from a labeler's browser or from another teacher.
-#[utoipa::path(post, path = "/api/v1/runs/{id}/teacher-tokens", tag = "runs", params(("id" = i64, Path)),
-    responses((status = 201, body = TokenView), (status = 403, body = Problem)))]
+#[utoipa::path(post, path = "/api/v1/runs/{id}/teacher-tokens", tag = "runs", operation_id = "createTeacherToken",
+    params(("id" = i64, Path)),
+    responses((status = 201, body = TokenView), (status = 403, description = "A labeler's browser asks, or another teacher.")))]
 pub async fn create_token(
     State(app): State<AppState>,
     headers: axum::http::HeaderMap,

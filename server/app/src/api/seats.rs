@@ -27,18 +27,24 @@ pub struct JoinRequest {
 /// A labeler who sits.
 #[derive(Debug, Serialize, ToSchema)]
 pub struct JoinedView {
-    /// By which they come back from another machine; `None` where they came by it.
+    /// By which they come back from another machine; null where they came by it.
     return_code: Option<String>,
 }
 
-/// Enters a study by a link's code, which is used up, or comes back by a return code. The reply
-/// sets the labeler's cookie.
+/// Enters a study by a link's code, which is used up, or comes back by a return code.
+///
+/// The reply sets the labeler's cookie.
 ///
 /// # Errors
 /// A code that leads nowhere, was used, has run out, or is of a study that is not open; no
 /// agreement.
-#[utoipa::path(post, path = "/api/v1/join", tag = "studies", request_body = JoinRequest,
-    responses((status = 201, body = JoinedView), (status = 404, body = Problem), (status = 410, body = Problem), (status = 422, body = Problem)))]
+#[utoipa::path(post, path = "/api/v1/join", tag = "studies", operation_id = "joinStudy", request_body = JoinRequest,
+    security(()),
+    responses((status = 201, body = JoinedView, description = "The labeler may answer.",
+            headers(("Set-Cookie" = String, description = "The labeler's cookie."))),
+        (status = 404, description = "A code that leads nowhere."),
+        (status = 410, description = "A code that was used or has run out, or of a study that is not open."),
+        (status = 422, description = "No agreement to the text about the study.")))]
 pub async fn join(
     State(app): State<AppState>,
     headers: HeaderMap,
@@ -129,8 +135,8 @@ pub struct PartView {
 ///
 /// # Errors
 /// Nobody has said who asks, or they sit in no study.
-#[utoipa::path(get, path = "/api/v1/seat", tag = "studies",
-    responses((status = 200, body = SeatPartsView), (status = 401, body = Problem), (status = 404, body = Problem)))]
+#[utoipa::path(get, path = "/api/v1/seat", tag = "studies", operation_id = "readSeat", security(("labelerCookie" = [])),
+    responses((status = 200, body = SeatPartsView), (status = 404, description = "The labeler sits in no study.")))]
 pub async fn read(
     State(app): State<AppState>,
     who: Answerer,

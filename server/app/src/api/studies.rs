@@ -83,7 +83,8 @@ pub struct SeatView {
 ///
 /// # Errors
 /// The database cannot be read.
-#[utoipa::path(get, path = "/api/v1/studies", tag = "studies", responses((status = 200, body = Vec<StudyView>)))]
+#[utoipa::path(get, path = "/api/v1/studies", tag = "studies", operation_id = "listStudies",
+    responses((status = 200, body = Vec<StudyView>)))]
 pub async fn list(State(app): State<AppState>) -> Result<Json<Vec<StudyView>>, Problem> {
     let mut views = Vec::new();
     for row in app.store.studies().await? {
@@ -96,8 +97,9 @@ pub async fn list(State(app): State<AppState>) -> Result<Json<Vec<StudyView>>, P
 ///
 /// # Errors
 /// Mistakes in the file, each with its line; an unknown name.
-#[utoipa::path(post, path = "/api/v1/studies", tag = "studies", request_body = StudyRequest,
-    responses((status = 201, body = StudyView), (status = 422, body = Problem)))]
+#[utoipa::path(post, path = "/api/v1/studies", tag = "studies", operation_id = "createStudy", request_body = StudyRequest,
+    responses((status = 201, body = StudyView, headers(("Location" = String, description = "Where the study is."))),
+        (status = 422, description = "Mistakes in the file, each with its line; an unknown name; neither or both of a name and a text.")))]
 pub async fn create(
     State(app): State<AppState>,
     Body(request): Body<StudyRequest>,
@@ -114,13 +116,18 @@ pub async fn create(
     Ok((StatusCode::CREATED, located, Json(view)).into_response())
 }
 
+/// Says whether a study was made from this file.
+///
 /// A study stays as its file was: what is drawn and answered belongs to that. The same file again
 /// changes nothing.
 ///
 /// # Errors
 /// Another file, which makes a study of its own.
-#[utoipa::path(put, path = "/api/v1/studies/{id}", tag = "studies", params(("id" = i64, Path)), request_body = StudyRequest,
-    responses((status = 200, body = StudyView), (status = 404, body = Problem), (status = 409, body = Problem)))]
+#[utoipa::path(put, path = "/api/v1/studies/{id}", tag = "studies", operation_id = "keepStudy",
+    params(("id" = i64, Path)), request_body = StudyRequest,
+    responses((status = 200, body = StudyView, description = "It was."),
+        (status = 409, description = "Another file, which makes a study of its own."),
+        (status = 422, description = "An unknown name; neither or both of a name and a text.")))]
 pub async fn keep(
     State(app): State<AppState>,
     Study(study): Study,
@@ -191,8 +198,8 @@ pub async fn begin(
 ///
 /// # Errors
 /// An unknown study.
-#[utoipa::path(get, path = "/api/v1/studies/{id}", tag = "studies", params(("id" = i64, Path)),
-    responses((status = 200, body = StudyView), (status = 404, body = Problem)))]
+#[utoipa::path(get, path = "/api/v1/studies/{id}", tag = "studies", operation_id = "readStudy",
+    params(("id" = i64, Path)), responses((status = 200, body = StudyView)))]
 pub async fn read(
     State(app): State<AppState>,
     Study(study): Study,
@@ -204,8 +211,9 @@ pub async fn read(
 ///
 /// # Errors
 /// An unknown study, or one that did not fail.
-#[utoipa::path(post, path = "/api/v1/studies/{id}/retry", tag = "studies", params(("id" = i64, Path)),
-    responses((status = 200, body = StudyView), (status = 404, body = Problem), (status = 409, body = Problem)))]
+#[utoipa::path(post, path = "/api/v1/studies/{id}/retry", tag = "studies", operation_id = "retryStudy",
+    params(("id" = i64, Path)),
+    responses((status = 200, body = StudyView), (status = 409, description = "The study did not fail.")))]
 pub async fn retry(
     State(app): State<AppState>,
     Study(study): Study,
@@ -219,8 +227,9 @@ pub async fn retry(
 ///
 /// # Errors
 /// An unknown study, or one that is not ready.
-#[utoipa::path(post, path = "/api/v1/studies/{id}/open", tag = "studies", params(("id" = i64, Path)),
-    responses((status = 200, body = StudyView), (status = 404, body = Problem), (status = 409, body = Problem)))]
+#[utoipa::path(post, path = "/api/v1/studies/{id}/open", tag = "studies", operation_id = "openStudy",
+    params(("id" = i64, Path)),
+    responses((status = 200, body = StudyView), (status = 409, description = "The study is not ready.")))]
 pub async fn open(
     State(app): State<AppState>,
     Study(study): Study,
@@ -233,8 +242,9 @@ pub async fn open(
 ///
 /// # Errors
 /// An unknown study, or one that was never open.
-#[utoipa::path(post, path = "/api/v1/studies/{id}/close", tag = "studies", params(("id" = i64, Path)),
-    responses((status = 200, body = StudyView), (status = 404, body = Problem), (status = 409, body = Problem)))]
+#[utoipa::path(post, path = "/api/v1/studies/{id}/close", tag = "studies", operation_id = "closeStudy",
+    params(("id" = i64, Path)),
+    responses((status = 200, body = StudyView), (status = 409, description = "The study was never open.")))]
 pub async fn close(
     State(app): State<AppState>,
     Study(study): Study,
@@ -277,9 +287,12 @@ pub struct InvitationView {
 ///
 /// # Errors
 /// An unknown study; clips that are missing; more labelers than the study has room for.
-#[utoipa::path(post, path = "/api/v1/studies/{id}/invitations", tag = "studies", params(("id" = i64, Path)),
-    request_body = InvitationRequest,
-    responses((status = 201, body = Vec<InvitationView>), (status = 404, body = Problem), (status = 409, body = Problem)))]
+#[utoipa::path(post, path = "/api/v1/studies/{id}/invitations", tag = "studies", operation_id = "inviteLabelers",
+    params(("id" = i64, Path)), request_body = InvitationRequest,
+    responses((status = 201, body = Vec<InvitationView>, description = "A link for each place."),
+        (status = 404, description = "The study has no place of this number."),
+        (status = 409, description = "Clips are missing, the study is closed, or it has no room for so many labelers."),
+        (status = 422, description = "More days or places than are given out at once.")))]
 pub async fn invite(
     State(app): State<AppState>,
     Study(study): Study,
@@ -353,8 +366,11 @@ pub fn link(headers: &HeaderMap, secret: &Secret) -> String {
 ///
 /// # Errors
 /// An unknown study or format.
-#[utoipa::path(get, path = "/api/v1/studies/{id}/labels", tag = "studies", params(("id" = i64, Path), Format),
-    responses((status = 200, content_type = "text/csv"), (status = 404, body = Problem), (status = 422, body = Problem)))]
+#[utoipa::path(get, path = "/api/v1/studies/{id}/labels", tag = "studies", operation_id = "exportStudyLabels",
+    params(("id" = i64, Path), Format),
+    responses((status = 200, description = "The table, as a file to keep.",
+            content(("text/csv"), ("application/x-ndjson"), ("application/vnd.apache.parquet"))),
+        (status = 422, description = "An unknown format.")))]
 pub async fn labels(
     State(app): State<AppState>,
     Study(study): Study,
@@ -368,9 +384,10 @@ pub async fn labels(
 ///
 /// # Errors
 /// An unknown study, or a figure that its answers do not make.
-#[utoipa::path(get, path = "/api/v1/studies/{id}/figures/{name}", tag = "studies",
-    params(("id" = i64, Path), ("name" = String, Path, description = "of a figure, and .svg")),
-    responses((status = 200, content_type = "image/svg+xml"), (status = 404, body = Problem)))]
+#[utoipa::path(get, path = "/api/v1/studies/{id}/figures/{name}", tag = "studies", operation_id = "readStudyFigure",
+    params(("id" = i64, Path), ("name" = String, Path, description = "The figure's name and `.svg`.")),
+    responses((status = 200, content_type = "image/svg+xml"),
+        (status = 404, description = "A figure that the study's answers do not make.")))]
 pub async fn figure(
     State(app): State<AppState>,
     Study(study): Study,

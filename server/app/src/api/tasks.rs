@@ -25,7 +25,8 @@ pub struct Named {
 }
 
 /// Tasks, methods and teachers.
-#[utoipa::path(get, path = "/api/v1/tasks", tag = "tasks", responses((status = 200, body = Registry)))]
+#[utoipa::path(get, path = "/api/v1/tasks", tag = "tasks", operation_id = "listTasks",
+    responses((status = 200, body = Registry)))]
 pub async fn list() -> Json<Registry> {
     let named = |(name, summary)| Named { name, summary };
     Json(Registry {

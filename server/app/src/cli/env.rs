@@ -4,7 +4,7 @@ use std::io::{self, BufRead, Write};
 use std::process::ExitCode;
 
 use domain::environment::{EnvError, EnvSpec, Environment, EpisodeEnd, TaskReward};
-use lab::config::find_task;
+use lab::config::{find_task, plainly};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -65,13 +65,13 @@ struct Nothing {}
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Reset {
-    seed: u64,
+    seed: Value,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Action {
-    action: Vec<f64>,
+    action: Value,
 }
 
 /// What a line is answered with.
@@ -143,12 +143,13 @@ struct Server {
 
 impl Server {
     fn answer(&mut self, line: &[u8]) -> Result<Answer, String> {
+        let line = line.trim_ascii();
         let value: Value = serde_json::from_slice(line)
-            .map_err(|error| format!("this line is no JSON: {error}"))?;
+            .map_err(|error| format!("this line is no JSON: {}", misread(line, &error)))?;
         if !value.is_object() {
             return Err("this line is JSON, but no object with named fields".into());
         }
-        let request = Request::deserialize(value).map_err(|error| error.to_string())?;
+        let request = Request::deserialize(value).map_err(|error| misfit(&error))?;
         let content = match (request.spec, request.reset, request.step) {
             (Some(Nothing {}), None, None) => {
                 if request.pose && self.episode == Episode::None {
@@ -157,6 +158,7 @@ impl Server {
                 Content::Spec(self.environment.spec().clone())
             }
             (None, Some(Reset { seed }), None) => {
+                let seed = whole(&seed)?;
                 self.episode = Episode::Running;
                 let observation = self.environment.reset(seed);
                 Content::Start { observation }
@@ -168,13 +170,13 @@ impl Server {
         Ok(Answer { content, pose })
     }
 
-    fn step(&mut self, action: &[f64]) -> Result<Content, String> {
+    fn step(&mut self, action: &Value) -> Result<Content, String> {
+        let action = components(action)?;
         match self.episode {
             Episode::None => return Err("reset the task before its first step".into()),
             Episode::Over => return Err("the episode is over: reset before the next step".into()),
             Episode::Running => {}
         }
-        let action: Vec<f32> = action.iter().map(|a| a.clamp(-1.0, 1.0) as f32).collect();
         let step = self.environment.step(&action).map_err(|error| {
             if matches!(error, EnvError::NotFinite { .. }) {
                 self.episode = Episode::Over;
@@ -191,6 +193,49 @@ impl Server {
             end: step.end,
         })
     }
+}
+
+/// What is wrong with a line that cannot be read, and where in it.
+fn misread(line: &[u8], error: &serde_json::Error) -> String {
+    if line.is_empty() {
+        return "it is empty".into();
+    }
+    if error.is_eof() {
+        return "it ends early".into();
+    }
+    let place = format!(" at line {} column {}", error.line(), error.column());
+    let told = error.to_string();
+    let what = told.strip_suffix(place.as_str()).unwrap_or(&told);
+    format!("{what}, at column {}", error.column())
+}
+
+/// What does not fit, without the names that types have here.
+fn misfit(error: &serde_json::Error) -> String {
+    let told = error.to_string();
+    match told.split_once(", expected struct ") {
+        Some((found, _)) => format!("{found}, expected an object with named fields"),
+        None => plainly(&told),
+    }
+}
+
+fn whole(seed: &Value) -> Result<u64, String> {
+    let most = u64::MAX;
+    let told = || format!("\"seed\" is {seed}, but must be a whole number from 0 to {most}");
+    seed.as_u64().ok_or_else(told)
+}
+
+/// The numbers of an action, each within its bounds.
+fn components(action: &Value) -> Result<Vec<f32>, String> {
+    let Some(components) = action.as_array() else {
+        let told = format!("\"action\" is {action}, but must be a list of numbers");
+        return Err(told);
+    };
+    let clamped = |(place, component): (usize, &Value)| {
+        let number = component.as_f64();
+        let number = number.map(|number| number.clamp(-1.0, 1.0) as f32);
+        number.ok_or_else(|| format!("action[{place}] is {component}, but must be a number"))
+    };
+    components.iter().enumerate().map(clamped).collect()
 }
 
 #[cfg(test)]
@@ -278,18 +323,25 @@ mod tests {
     fn what_does_not_fit_is_named_and_changes_nothing() {
         let wrong = [
             (r#"{"step":{"action":[1,0]}}"#, "3 numbers, got 2"),
-            (r#"{"step":{"action":[1,0,null]}}"#, "null"),
+            (r#"{"step":{"action":[1,0,null]}}"#, "action[2] is null"),
+            (r#"{"step":{"action":"up"}}"#, "must be a list of numbers"),
+            (r#"{"step":3}"#, "expected an object with named fields"),
             (r#"{"step":{"action":[1,0,1e999]}}"#, "out of range"),
             (r#"{"step":{"action":[1,0,NaN]}}"#, "no JSON"),
             (r#"{"step":{"action":[1,0,0],"n":2}}"#, "unknown field `n`"),
             (r#"{"stepp":{"action":[1,0,0]}}"#, "unknown field `stepp`"),
             (r#"{"reset":{}}"#, "missing field `seed`"),
-            (r#"{"reset":{"seed":-1}}"#, "-1"),
+            (
+                r#"{"reset":{"seed":-1}}"#,
+                "\"seed\" is -1, but must be a whole",
+            ),
+            (r#"{"pose":1,"spec":{}}"#, "expected true or false"),
             (r#"{"spec":{},"reset":{"seed":1}}"#, "one of"),
             ("{}", "one of"),
             ("[1]", "no object"),
-            ("", "no JSON"),
-            ("hello", "no JSON"),
+            ("", "no JSON: it is empty"),
+            ("{", "no JSON: it ends early"),
+            ("hello", "no JSON: expected value, at column"),
         ];
         let mut lines = vec![RESET];
         lines.extend(wrong.map(|(line, _)| line));

@@ -4,9 +4,10 @@ use std::process::ExitCode;
 
 use lab::config::find_task;
 use lab::evaluate::evaluate;
+use lab::words::counted;
 use serde_json::json;
 
-use super::BadInput;
+use super::{BadInput, number};
 use crate::policy::Policy;
 
 /// Try a policy on held-out episodes.
@@ -23,12 +24,19 @@ pub struct Args {
     policy: String,
     /// How many episodes
     #[arg(long, default_value_t = 50, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    #[arg(allow_negative_numbers = true)]
     episodes: u32,
     /// Of the episodes' poses and the policy's chance
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, value_parser = number::whole::<u64>)]
+    #[arg(allow_negative_numbers = true)]
     seed: u64,
     /// Standard deviation of noise added to each action
-    #[arg(long, default_value_t = 0.0, value_name = "SIGMA")]
+    #[arg(
+        long,
+        default_value_t = 0.0,
+        value_name = "SIGMA",
+        allow_negative_numbers = true
+    )]
     noise: f64,
     /// One JSON object instead of a sentence
     #[arg(long)]
@@ -69,8 +77,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     } else {
         let first = median.map_or_else(|| "never".to_owned(), |m| format!("at step {m} (median)"));
         println!(
-            "{} on {}: success {success:.3} over {} episodes, return {mean:.1} ± {std:.1}, first success {first}",
-            args.policy, args.task, args.episodes
+            "{} on {}: success {success:.3} over {}, return {mean:.1} ± {std:.1}, first success {first}",
+            args.policy,
+            args.task,
+            counted(args.episodes.into(), "episode", "episodes")
         );
     }
     Ok(ExitCode::SUCCESS)

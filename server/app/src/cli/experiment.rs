@@ -9,8 +9,8 @@ use clap::Subcommand;
 use lab::experiment::grid::{self, Grid, GridText, SHIPPED};
 use lab::experiment::{self, EXPERIMENTS, Settings};
 
-use super::BadInput;
-use super::figure::{Format, encode, write};
+use super::figure::{Format, encode};
+use super::{BadInput, number, out};
 use crate::provenance::processors;
 
 mod check;
@@ -33,10 +33,11 @@ pub struct Args {
     #[arg(long, value_name = "DIR", required = true)]
     out: Option<PathBuf>,
     /// Independent repetitions
-    #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u64).range(1..=10_000))]
-    seeds: u64,
+    #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    #[arg(allow_negative_numbers = true)]
+    seeds: u32,
     /// Threads [default: one for each processor]; changes no number
-    #[arg(long)]
+    #[arg(long, value_parser = number::at_least_one, allow_negative_numbers = true)]
     threads: Option<NonZeroUsize>,
 }
 
@@ -52,7 +53,8 @@ enum Command {
 fn after_help() -> String {
     let mut text = "Experiments without simulation:\n".to_owned();
     for experiment in EXPERIMENTS {
-        writeln!(text, "  {:22} {}", experiment.name, experiment.summary)
+        // Further in than its name: a line that is too long goes on as far in as it began.
+        writeln!(text, "  {}\n      {}", experiment.name, experiment.summary)
             .expect("writing to a string cannot fail");
     }
     let names: Vec<&str> = SHIPPED.iter().map(|shipped| shipped.name).collect();
@@ -98,9 +100,10 @@ fn without_simulation(args: &Args) -> anyhow::Result<ExitCode> {
     }
     let experiment = experiment::find(name).map_err(BadInput::from_error)?;
     let settings = Settings {
-        n_seeds: args.seeds,
+        n_seeds: args.seeds.into(),
         n_threads: args.threads.unwrap_or_else(processors),
     };
+    out::folder(out)?;
     for artifact in (experiment.run)(settings)? {
         write_with_picture(&out.join(artifact.name), artifact.text)?;
     }
@@ -109,11 +112,11 @@ fn without_simulation(args: &Args) -> anyhow::Result<ExitCode> {
 
 /// Writes a text, and beside an SVG the same as PNG; says what is there now.
 fn write_with_picture(path: &Path, text: String) -> anyhow::Result<()> {
-    write(path, text.as_bytes())?;
+    out::write(path, text.as_bytes())?;
     println!("{}", path.display());
     if Format::of(path).ok() == Some(Format::Svg) {
         let picture = path.with_extension("png");
-        write(&picture, &encode(text, Format::Png, 2.0)?)?;
+        out::write(&picture, &encode(text, Format::Png, 2.0)?)?;
         println!("{}", picture.display());
     }
     Ok(())
@@ -133,8 +136,7 @@ impl Chosen {
         let (text, stem) = if is_path(path) {
             let text = std::fs::read_to_string(path)
                 .map_err(|error| BadInput(format!("cannot read {name}: {error}")))?;
-            let stem = path.file_stem().unwrap_or_default();
-            (text, stem.to_string_lossy().into_owned())
+            (text, stem(path))
         } else {
             let shipped = grid::shipped(name).map_err(BadInput::from_error)?;
             (shipped.text.to_owned(), name.to_owned())
@@ -148,6 +150,17 @@ impl Chosen {
         };
         Ok(Self { grid, text, stem })
     }
+}
+
+/// What the folder for a file's results is called. An `experiment.toml` lies in a folder whose name
+/// tells it from others.
+fn stem(path: &Path) -> String {
+    let folder = path.parent().filter(|folder| *folder != Path::new(""));
+    let folder = folder.unwrap_or(Path::new(".")).canonicalize().ok();
+    let folder = folder.as_deref().and_then(Path::file_name);
+    let telling = folder.filter(|_| path.ends_with("experiment.toml"));
+    let name = telling.or(path.file_stem()).unwrap_or_default();
+    name.to_string_lossy().into_owned()
 }
 
 /// Whether a file is meant, there or not, and no name of one that comes with the program. A folder
@@ -170,13 +183,26 @@ fn in_words(time: std::time::Duration) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::in_words;
+    use std::path::Path;
     use std::time::Duration;
+
+    use super::{in_words, stem};
 
     #[test]
     fn times_are_told_as_coarsely_as_they_are_known() {
         let words =
             [40, 3_600 + 1_200, 2 * 86_400 + 3_600 * 5].map(|s| in_words(Duration::from_secs(s)));
         assert_eq!(words, ["1 min", "1 h 20 min", "2 d 5 h"]);
+    }
+
+    #[test]
+    fn results_are_called_as_their_file_or_as_the_folder_of_a_kept_one() {
+        let here = tempfile::tempdir().unwrap();
+        std::fs::create_dir(here.path().join("walker-run")).unwrap();
+        let of = |name: &str| stem(&here.path().join(name));
+        assert_eq!(of("walker-run/experiment.toml"), "walker-run");
+        assert_eq!(of("walker-run/../walker-run/experiment.toml"), "walker-run");
+        assert_eq!(of("walker-run/mine.toml"), "mine");
+        assert_eq!(stem(Path::new("mine.toml")), "mine");
     }
 }

@@ -9,8 +9,8 @@ use std::time::Duration;
 use anyhow::Context as _;
 use store::{LabelsOf, RunId, Store, StudyId};
 
-use super::BadInput;
 use super::client::{Client, path_segment};
+use super::{BadInput, out};
 use crate::label_table::{self, TableError, TableFormat};
 
 /// Write the answers of a run or a study as a table, one row each, from a server or from its data folder
@@ -19,12 +19,13 @@ use crate::label_table::{self, TableError, TableFormat};
   stair export --run 1 --out answers.csv
   stair export --run 1 --format jsonl --server http://127.0.0.1:8080
   stair export --study 2 --format parquet --out answers.parquet")]
+#[command(group(clap::ArgGroup::new("of").required(true).args(["run", "study"])))]
 pub struct Args {
     /// The run's id, as its page's address has it
-    #[arg(long, value_name = "ID", required_unless_present = "study")]
+    #[arg(long, value_name = "ID")]
     run: Option<String>,
     /// Instead of a run: a study's number, as its page's address has it
-    #[arg(long, value_name = "ID", conflicts_with = "run")]
+    #[arg(long, value_name = "ID")]
     study: Option<String>,
     /// A data folder that no server holds
     #[arg(long, value_name = "DIR", default_value = "data")]
@@ -56,18 +57,21 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
 /// Writes a table to a file, whole or not at all, or to the terminal.
 ///
 /// # Errors
-/// What `write` says; a file that cannot be written.
+/// [`BadInput`] for a file that has no place; what `write` says; a file that cannot be written.
 pub(super) fn write_to(
-    out: Option<&Path>,
+    path: Option<&Path>,
     write: impl FnOnce(&mut dyn Write) -> anyhow::Result<()>,
 ) -> anyhow::Result<()> {
-    let Some(path) = out else {
+    let Some(path) = path else {
         return write(&mut std::io::stdout().lock());
     };
+    out::file(path)?;
     let told = || format!("cannot write {}", path.display());
     // Beside it first: a table that ends early must not look whole.
     let part = path.with_added_extension("part");
-    let mut file = BufWriter::new(File::create(&part).with_context(told)?);
+    let made = std::fs::create_dir_all(out::parent(path)).and_then(|()| File::create(&part));
+    let made = made.with_context(told).map_err(BadInput::from_error)?;
+    let mut file = BufWriter::new(made);
     let written = write(&mut file).and_then(|()| file.flush().with_context(told));
     if written.is_err() {
         let _ = std::fs::remove_file(&part); // it may be gone; the first error is told

@@ -1,16 +1,17 @@
 //! `stair figure`: results as pictures.
 
 use std::fmt::Write as _;
+use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use anyhow::Context as _;
 use lab::config::RunConfig;
+use lab::experiment::results::read_rows;
 use lab::figure::{self, FIGURES, Request, Source};
 use lab::record::RunRecord;
 use lab::temporal_map::TemporalMap;
 
-use super::BadInput;
+use super::{BadInput, number, out};
 
 mod picture;
 mod strips;
@@ -26,7 +27,7 @@ const TOP: usize = 2;
 pub struct Args {
     /// Which figure
     name: String,
-    /// Files of rows; for some figures also folders of runs or packed query sets
+    /// Files of rows; for some figures also folders of runs or experiments, or packed query sets
     #[arg(value_name = "ROWS")]
     rows: Vec<PathBuf>,
     /// What runs along the horizontal axis
@@ -39,24 +40,31 @@ pub struct Args {
     #[arg(long, value_name = "HOW")]
     center: Option<String>,
     /// Queries of each method, for strips [default: 2]
-    #[arg(long, value_name = "N")]
-    top: Option<usize>,
+    #[arg(long, value_name = "N", value_parser = number::at_least_one)]
+    #[arg(allow_negative_numbers = true)]
+    top: Option<NonZeroUsize>,
     /// The episode to show, for temporal-map [default: the one that was asked about most]
-    #[arg(long, value_name = "NUMBER")]
+    #[arg(long, value_name = "NUMBER", allow_negative_numbers = true)]
     episode: Option<u32>,
     /// Where to write it; .svg or .png
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
     /// Pixels of a PNG for each unit of the figure
-    #[arg(long, default_value_t = 2.0, value_name = "TIMES")]
+    #[arg(
+        long,
+        default_value_t = 2.0,
+        value_name = "TIMES",
+        allow_negative_numbers = true
+    )]
     scale: f32,
 }
 
 fn after_help() -> String {
     let mut text = "Figures and their rows:\n".to_owned();
     for figure in FIGURES {
-        writeln!(text, "  {:20} {}", figure.name, figure.summary)
-            .and_then(|()| writeln!(text, "  {:20} {}", "", figure.input))
+        // Under the name and further in: a line that is too long goes on as far in as it began.
+        let (name, summary, input) = (figure.name, figure.summary, figure.input);
+        writeln!(text, "  {name}\n      {summary}\n      {input}")
             .expect("writing to a string cannot fail");
     }
     text.push_str(
@@ -81,6 +89,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         let told = format!("--scale is {}, but must be from 0.1 to 10", args.scale);
         return Err(BadInput(told).into());
     }
+    out::file(&args.out)?;
     let sources = sources(figure.name, args)?;
     let request = Request {
         sources: &sources,
@@ -90,7 +99,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         ..Request::default()
     };
     let svg = figure::make(figure, &request).map_err(BadInput::from_error)?;
-    write(&args.out, &encode(svg, format, args.scale)?)?;
+    out::write(&args.out, &encode(svg, format, args.scale)?)?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -103,7 +112,7 @@ fn sources(figure: &str, args: &Args) -> anyhow::Result<Vec<Source>> {
     match (figure, args.top, args.episode) {
         (_, Some(_), _) if figure != "strips" => refused("top"),
         (_, _, Some(_)) if figure != "temporal-map" => refused("episode"),
-        ("strips", top, _) => strips::sources(&args.rows, top.unwrap_or(TOP)),
+        ("strips", top, _) => strips::sources(&args.rows, top.map_or(TOP, NonZeroUsize::get)),
         ("temporal-map", _, episode) => {
             let map = |path: &PathBuf| temporal_map(path, episode);
             args.rows.iter().map(map).collect()
@@ -125,42 +134,54 @@ fn temporal_map(path: &Path, episode: Option<u32>) -> anyhow::Result<Source> {
     })
 }
 
-/// Writes a file, and makes its folder where there is none.
-pub(super) fn write(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
-    let folder = path.parent().unwrap_or(Path::new(""));
-    std::fs::create_dir_all(folder)
-        .and_then(|()| std::fs::write(path, bytes))
-        .with_context(|| format!("cannot write {}", path.display()))
-}
-
-/// A file of rows, or a run's folder (or its metrics) as the rows of its evaluations.
+/// A file of rows, the rows in an experiment's folder, or a run's folder (or its metrics) as the
+/// rows of its evaluations.
 fn read(path: &Path) -> anyhow::Result<Source> {
-    let text = |path: &Path| {
-        std::fs::read_to_string(path)
-            .map_err(|error| BadInput(format!("cannot read {}: {error}", path.display())))
-    };
     if path.ends_with("metrics.jsonl") && path.with_file_name("config.toml").exists() {
         let folder = path.parent().filter(|folder| *folder != Path::new(""));
-        return read(folder.unwrap_or(Path::new(".")));
+        return of_run(folder.unwrap_or(Path::new(".")));
     }
-    if !path.is_dir() {
+    if path.join("config.toml").exists() {
+        return of_run(path);
+    }
+    let results = path.join("results.jsonl");
+    if results.exists() {
+        let rows = read_rows(&results);
         return Ok(Source {
-            name: path.display().to_string(),
-            text: text(path)?,
+            text: rows.map_err(|error| unreadable(&results, &error))?,
+            name: results.display().to_string(),
         });
     }
-    let (settings, metrics) = (path.join("config.toml"), path.join("metrics.jsonl"));
-    if !settings.exists() {
-        return Err(BadInput(format!("{} is not the folder of a run", path.display())).into());
+    if path.is_dir() {
+        let told = "is not the folder of a run or an experiment: it holds neither config.toml nor \
+                    results.jsonl";
+        return Err(BadInput(format!("{} {told}", path.display())).into());
     }
+    Ok(Source {
+        text: text(path)?,
+        name: path.display().to_string(),
+    })
+}
+
+/// The evaluations of a run as rows.
+fn of_run(folder: &Path) -> anyhow::Result<Source> {
+    let (settings, metrics) = (folder.join("config.toml"), folder.join("metrics.jsonl"));
     let config = RunConfig::parse(&settings.display().to_string(), &text(&settings)?)
         .map_err(BadInput::from_error)?;
     let name = metrics.display().to_string();
-    let text = figure::rows_of_run(&config, &name, &text(&metrics)?);
+    let rows = figure::rows_of_run(&config, &name, &text(&metrics)?);
     Ok(Source {
-        text: text.map_err(BadInput::from_error)?,
+        text: rows.map_err(BadInput::from_error)?,
         name,
     })
+}
+
+fn text(path: &Path) -> Result<String, BadInput> {
+    std::fs::read_to_string(path).map_err(|error| unreadable(path, &error))
+}
+
+fn unreadable(path: &Path, error: &std::io::Error) -> BadInput {
+    BadInput(format!("cannot read {}: {error}", path.display()))
 }
 
 #[cfg(test)]
@@ -191,13 +212,13 @@ mod tests {
                  \"return_mean\":1.0,\"return_std\":0.0,\"reward_correlation\":null}}\n"
             )
         };
-        write(
+        out::write(
             &run_folder.join("config.toml"),
             RunConfig::default().to_toml().as_bytes(),
         )
         .unwrap();
         let metrics = evaluation(0) + &evaluation(1_000);
-        write(&run_folder.join("metrics.jsonl"), metrics.as_bytes()).unwrap();
+        out::write(&run_folder.join("metrics.jsonl"), metrics.as_bytes()).unwrap();
         for ending in ["svg", "png"] {
             let draw = |name: &str| {
                 let out = folder.path().join(name).with_extension(ending);
@@ -215,7 +236,7 @@ mod tests {
     #[test]
     fn an_option_of_another_figure_is_bad_input() {
         let mut args = args("rows.jsonl".into(), "figure.svg".into());
-        args.top = Some(3);
+        args.top = NonZeroUsize::new(3);
         let told = run(&args).unwrap_err();
         assert!(told.is::<BadInput>() && told.to_string().contains("no choice of --top"));
         (args.top, args.episode) = (None, Some(3));
@@ -227,7 +248,7 @@ mod tests {
     fn strips_and_maps_of_what_holds_none_are_bad_input() {
         let folder = tempfile::tempdir().unwrap();
         let foreign = folder.path().join("mine.queries");
-        write(&foreign, b"no queries").unwrap();
+        out::write(&foreign, b"no queries").unwrap();
         for (name, rows, said) in [
             ("strips", foreign, "is no packed query set"),
             ("strips", folder.path().to_owned(), "holds no run"),
@@ -241,6 +262,35 @@ mod tests {
                 "{told}"
             );
         }
+    }
+
+    #[test]
+    fn an_experiments_folder_is_drawn_as_its_rows() {
+        let folder = tempfile::tempdir().unwrap();
+        let rows = folder.path().join("results.jsonl");
+        let row = |step: u32| {
+            format!(
+                "{{\"task\":\"go-fetch-return\",\"method\":\"stair\",\"teacher\":\"oracle\",\"setting\":\"\",\
+                 \"seed\":1,\"kind\":\"evaluation\",\"step\":{step},\"labels\":4,\"episodes\":10,\
+                 \"success_rate\":0.5,\"return_mean\":7.5,\"return_std\":1.0,\"reward_correlation\":null}}\n"
+            )
+        };
+        out::write(&rows, (row(0) + &row(1_000)).as_bytes()).unwrap();
+        let [of_rows, of_folder] = [rows.as_path(), folder.path()].map(|path: &Path| {
+            let out = folder.path().join("figure.svg");
+            run(&args(path.to_owned(), out.clone())).unwrap();
+            std::fs::read(out).unwrap()
+        });
+        assert_eq!(of_rows, of_folder);
+    }
+
+    #[test]
+    fn a_figure_that_has_no_place_is_refused_before_it_is_drawn() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("rows.jsonl");
+        out::write(&file, b"no rows").unwrap();
+        let told = run(&args(file.clone(), file.join("figure.svg"))).unwrap_err();
+        assert!(told.is::<BadInput>() && told.to_string().contains("is no folder"));
     }
 
     #[test]

@@ -13,8 +13,10 @@ use super::BadInput;
 ///
 /// Prints the largest error of each field, and for whole trajectories how our physics follows the
 /// recorded actions: the hand until it touches something (10 mm), the object at the end of an
-/// expert's episode (15 % of its travel). Ends with code 1 when a field is past its tolerance
-/// (rewards 1e-6, observations 1e-5, success exact; the physics are only told) and 2 when a line or a path cannot be read.
+/// expert's episode (15 % of its travel). Ends with code 1 when a field is past the tolerance that
+/// stands beside it (observations 1e-5, success exact, rewards 1e-6 or, where the recording is
+/// rounded, 2e-5, poses and inertias 1e-4, gravity and other bias forces 1e-3; the physics are
+/// only told) and 2 when a line or a path cannot be read.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   stair golden tests/golden

@@ -6,10 +6,11 @@ use std::process::ExitCode;
 use anyhow::Context;
 use domain::scene::{Camera, Frame, Scene};
 use lab::config::find_task;
+use lab::words::counted;
 use learn::device::with_denormals;
 use render::{CLIP_SIZE, Renderer, RgbaImage, SHEET_FRAMES, clip, contact_sheet, evenly};
 
-use super::BadInput;
+use super::{BadInput, number, out};
 use crate::policy::Policy;
 
 /// Draw an episode as a clip (.mp4) or a contact sheet (.png)
@@ -28,10 +29,11 @@ pub struct Args {
     #[arg(long)]
     out: PathBuf,
     /// Which starting position, and which chances of a random policy
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, value_parser = number::whole::<u64>)]
+    #[arg(allow_negative_numbers = true)]
     seed: u64,
     /// Steps to draw [default: the whole episode]
-    #[arg(long)]
+    #[arg(long, allow_negative_numbers = true)]
     steps: Option<u32>,
     /// Where to look from [default: the task's first camera]
     #[arg(long)]
@@ -63,6 +65,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let scene = (task.scene)();
     let camera = camera(&scene, args.camera.as_deref())?;
     let policy = Policy::open(task, &args.policy, 0.0, args.seed)?;
+    out::file(&args.out)?;
     let renderer = Renderer::new()?;
     let frames = episode(task, &policy, args.seed, args.steps)?;
     let images = match form {
@@ -73,11 +76,11 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         Form::Clip => clip::encode(&images, clip::frames_per_second(images.len()))?.bytes,
         Form::Sheet => png(&contact_sheet(&images)?)?,
     };
-    std::fs::write(&args.out, &bytes).with_context(|| format!("writing {}", args.out.display()))?;
+    out::write(&args.out, &bytes)?;
     println!(
-        "{}: {} frames of {}, {} kB",
+        "{}: {} of {}, {} kB",
         args.out.display(),
-        images.len(),
+        counted(images.len() as u64, "frame", "frames"),
         task.name,
         bytes.len().div_ceil(1000)
     );

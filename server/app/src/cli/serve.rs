@@ -1,6 +1,7 @@
 //! `stair serve`: the server.
 
 use std::future::IntoFuture as _;
+use std::io::IsTerminal as _;
 use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -28,6 +29,7 @@ const GRACE: Duration = Duration::from_millis(500);
 pub struct Args {
     /// Address and port; port 0 takes a free one
     #[arg(long, default_value = "127.0.0.1:8080", value_name = "ADDRESS:PORT")]
+    #[arg(value_parser = address)]
     bind: SocketAddr,
     /// Folder for the database, clips and runs
     #[arg(long, default_value = "data", value_name = "DIR")]
@@ -45,6 +47,16 @@ pub struct Args {
     new_token: bool,
 }
 
+/// An address to listen on; `localhost` is this machine's own.
+fn address(text: &str) -> Result<SocketAddr, String> {
+    let numbers = match text.split_once(':') {
+        Some(("localhost", port)) => format!("127.0.0.1:{port}"),
+        _ => text.to_owned(),
+    };
+    let parsed = numbers.parse::<SocketAddr>();
+    parsed.map_err(|_| "write an address and a port, for instance 127.0.0.1:8080".to_owned())
+}
+
 /// Runs the command.
 ///
 /// # Errors
@@ -55,9 +67,12 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let filter = filter.unwrap_or_else(|_| {
         "info,sqlx=warn,wgpu=error,naga=error,wgpu_hal=off,wgpu_core=error".into()
     });
+    // Colours are for people who look, and who have not said otherwise.
+    let is_plain = std::env::var("NO_COLOR").is_ok_and(|value| !value.is_empty());
     tracing_subscriber::fmt()
         .with_env_filter(filter)
         .with_writer(std::io::stderr)
+        .with_ansi(std::io::stderr().is_terminal() && !is_plain)
         .init();
     let runtime = tokio::runtime::Runtime::new().context("cannot start the server's threads")?;
     runtime.block_on(serve(args))?;
@@ -173,5 +188,21 @@ async fn told_to_stop() {
     tokio::select! {
         _ = tokio::signal::ctrl_c() => {}
         _ = terminate.recv() => {}
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::address;
+
+    #[test]
+    fn this_machine_may_be_called_by_name_and_what_is_no_address_is_told_one() {
+        let own = address("127.0.0.1:8080");
+        assert_eq!(address("localhost:8080"), own);
+        assert!(own.is_ok() && address("[::1]:0").is_ok());
+        for wrong in ["8080", ":8080", "localhost", "localhost:", "example.org:80"] {
+            let told = address(wrong).unwrap_err();
+            assert!(told.ends_with("for instance 127.0.0.1:8080"), "{told}");
+        }
     }
 }

@@ -7,6 +7,7 @@ use clap::Subcommand;
 use domain::nearest::nearest;
 use domain::query::Question;
 use lab::study::{READY, StudyFile};
+use lab::words::counted;
 
 use super::{BadInput, say};
 
@@ -115,13 +116,15 @@ fn described(study: &StudyFile) -> String {
         format!("queries of {}", methods.join(" and "))
     };
     format!(
-        "{}\n  asks      {asked}, {} steps each\n  tasks     {}\n  segments  from {from}\n  \
-         labelers  {} at most; each answers {n_counted} pairs, after {n_practice} for practice, with \
-         {n_extra} repeats and checks among them\nNo mistakes.\n",
+        "{}\n  asks      {asked}, {} each\n  tasks     {}\n  segments  from {from}\n  \
+         labelers  {} at most; each answers {}, after {n_practice} for practice, with {} among \
+         them\nNo mistakes.\n",
         study.title,
-        study.segment_len,
+        counted(study.segment_len.into(), "step", "steps"),
         study.tasks.join(", "),
         study.labelers_per_item,
+        counted(n_counted.into(), "pair", "pairs"),
+        counted(n_extra.into(), "repeat or check", "repeats and checks"),
     )
 }
 

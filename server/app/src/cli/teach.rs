@@ -10,10 +10,12 @@ use domain::episode::{EpisodeId, Segment, SegmentRecord};
 use domain::query::{OfferedQuery, QueryKey};
 use domain::teacher::{Judge, TeacherSettings};
 use indicatif::{ProgressBar, ProgressStyle};
+use lab::words::counted;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
 use super::client::{Client, Refused, path_segment};
+use super::number;
 
 /// Queries asked for at once.
 const LEASES: u32 = 50;
@@ -44,7 +46,7 @@ pub struct Args {
     #[arg(long)]
     token: Option<String>,
     /// Of the teacher's mistakes [default: the run's]
-    #[arg(long)]
+    #[arg(long, value_parser = number::whole::<u64>, allow_negative_numbers = true)]
     seed: Option<u64>,
 }
 
@@ -85,8 +87,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let started = Instant::now();
     let end = teacher.answer_all()?;
     println!(
-        "Answered {} queries in {:.0} s. {end}",
-        teacher.n_answered,
+        "Answered {} in {:.0} s. {end}",
+        counted(teacher.n_answered.into(), "query", "queries"),
         started.elapsed().as_secs_f64()
     );
     Ok(ExitCode::SUCCESS)
@@ -153,6 +155,7 @@ impl Remote {
         if let Ok(style) = ProgressStyle::with_template("{bar:30} {pos}/{len} answers  {msg}") {
             bar.set_style(style);
         }
+        let mut has_said_why = false;
         loop {
             let told = self
                 .client
@@ -173,7 +176,14 @@ impl Remote {
                     return Ok(message);
                 }
                 Some("failed") => anyhow::bail!("the run cannot go on: {message}"),
-                _ => std::thread::sleep(WAIT),
+                _ => {
+                    let hold_up = hold_up(state).filter(|_| !has_said_why);
+                    if let Some(hold_up) = hold_up {
+                        bar.suspend(|| eprintln!("{hold_up}"));
+                        has_said_why = true;
+                    }
+                    std::thread::sleep(WAIT);
+                }
             }
         }
     }
@@ -205,6 +215,18 @@ impl Remote {
         }
         Ok(())
     }
+}
+
+/// What others have to do before there is anything to answer, in words; `None` where the run only
+/// needs its time.
+fn hold_up(state: &Value) -> Option<String> {
+    if !matches!(state["kind"].as_str(), Some("held" | "paused")) {
+        return None;
+    }
+    let message = state["message"].as_str().unwrap_or_default();
+    let until = state["until"].as_str();
+    let until = until.map(|until| format!(" The first may come back at {until}."));
+    Some(format!("Waiting. {message}{}", until.unwrap_or_default()))
 }
 
 fn show(bar: &ProgressBar, told: &Value) {
@@ -303,6 +325,19 @@ mod tests {
         );
         assert_eq!(pressed(truth(&[1.0], &[1.0], Which::First)), "left");
         assert_eq!(pressed(truth(&[1.0], &[1.0], Which::Second)), "right");
+    }
+
+    #[test]
+    fn a_wait_for_others_is_told_and_one_for_the_agent_is_not() {
+        let held = json!({
+            "kind": "held", "message": "Others hold them.", "until": "2026-12-01T13:40:00Z",
+        });
+        assert_eq!(
+            hold_up(&held).as_deref(),
+            Some("Waiting. Others hold them. The first may come back at 2026-12-01T13:40:00Z.")
+        );
+        let waiting = json!({"kind": "waiting", "message": "training", "until": null});
+        assert_eq!(hold_up(&waiting), None);
     }
 
     #[test]

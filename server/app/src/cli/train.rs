@@ -8,14 +8,15 @@ use std::time::{Duration, Instant};
 use anyhow::Context as _;
 use domain::teacher::{Judge, Scripted, TeacherSettings};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use lab::config::{Layers, RunConfig, scripted_teacher};
+use lab::config::{Layers, RunConfig, identity, scripted_teacher};
 use lab::history::Sitting;
 use lab::message::{Command, Event};
 use lab::run::{Outcome, Run};
+use lab::words::counted;
 use serde_json::json;
 
-use super::BadInput;
 use super::interrupt::on_interrupt;
+use super::{BadInput, number};
 use crate::provenance;
 
 /// Train an agent with a scripted teacher.
@@ -27,7 +28,7 @@ use crate::provenance;
   stair train window-open --teacher mistaken --set teacher.mistake=0.2
   stair train --resume data/train/window-open-stair-1")]
 pub struct Args {
-    /// The task; `stair tasks` lists them
+    /// The task, where no file of --config names it; `stair tasks` lists them
     #[arg(required_unless_present_any = ["resume", "config"])]
     task: Option<String>,
     /// The method; `stair tasks` lists them
@@ -43,17 +44,17 @@ pub struct Args {
     #[arg(long = "set", value_name = "KEY=VALUE")]
     settings: Vec<String>,
     /// Of every random stream
-    #[arg(long)]
+    #[arg(long, value_parser = number::whole::<u64>, allow_negative_numbers = true)]
     seed: Option<u64>,
     /// Who answers: oracle, mistaken, inconsistent, myopic, noisy, equal, skip, coin [default:
     /// oracle; with --resume whoever has answered so far]
     #[arg(long)]
     teacher: Option<String>,
     /// Answers in all
-    #[arg(long)]
+    #[arg(long, allow_negative_numbers = true)]
     labels: Option<u32>,
     /// Environment steps in all
-    #[arg(long)]
+    #[arg(long, value_parser = number::whole::<u64>, allow_negative_numbers = true)]
     steps: Option<u64>,
     /// cpu or cuda; a run may go on on another device than it began on
     #[arg(long)]
@@ -125,14 +126,14 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             })
         ),
         Outcome::Finished(finished) => println!(
-            "{} on {}: success {:.2}, return {:.0} after {} steps and {} labels, {:.0} s. Weights {}.\n\
+            "{} on {}: success {:.2}, return {:.0} after {} and {}, {:.0} s. Weights {}.\n\
              Look at it: stair render {} --policy {} --out clip.mp4",
             config.method,
             config.task,
             finished.success_rate,
             finished.return_mean,
-            finished.step,
-            finished.labels,
+            counted(finished.step, "step", "steps"),
+            counted(finished.labels.into(), "label", "labels"),
             wall_s,
             finished.weights,
             config.task,
@@ -173,6 +174,9 @@ fn layers(args: &Args) -> anyhow::Result<Layers> {
             Some((name, text.map_err(BadInput::from_error)?))
         }
     };
+    for setting in &args.settings {
+        refuse_identity(setting)?;
+    }
     let mut overrides = args.settings.clone();
     overrides.extend(args.seed.map(|seed| format!("seed={seed}")));
     overrides.extend(
@@ -195,6 +199,17 @@ fn layers(args: &Args) -> anyhow::Result<Layers> {
         file,
         overrides,
     })
+}
+
+/// Task, method and seed have arguments of their own, which no setting changes.
+fn refuse_identity(setting: &str) -> Result<(), BadInput> {
+    let instead = match identity(setting) {
+        None => return Ok(()),
+        Some("task") => "name the task by itself: stair train TASK",
+        Some("method") => "use --method",
+        Some(_) => "use --seed",
+    };
+    Err(BadInput(format!("--set {setting}: {instead}")))
 }
 
 /// The scripted teacher of that name.

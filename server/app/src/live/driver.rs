@@ -87,7 +87,10 @@ impl Driver {
         })?;
         match outcome {
             Outcome::Finished(finished) => Ok(StateLine::finished(&finished)),
-            Outcome::Stopped => Ok(StateLine::stopped(run.step())),
+            Outcome::Stopped => {
+                self.note_step(run.step(), None);
+                Ok(StateLine::stopped(run.step()))
+            }
         }
     }
 
@@ -134,7 +137,10 @@ impl Driver {
 
     /// Shows what is only of the moment.
     fn say(&self, phase: Phase, config: &RunConfig) {
-        self.show(&StateLine::of_phase(&phase, config));
+        // How far it is need not be stored at every moment, but where it comes to wait.
+        if self.show(&StateLine::of_phase(&phase, config)) {
+            self.note_step(phase.step, None);
+        }
         lock(&self.now).phase = Some(phase.clone());
         let data = serde_json::to_value(Event::Phase(phase)).unwrap_or_default();
         let _ = self.inner.events.send(LiveEvent {
@@ -155,6 +161,10 @@ impl Driver {
         };
         // Answers over HTTP are counted where they are stored.
         let n_labels = (!is_over_http(&row.teacher)).then_some(n_labels);
+        self.note_step(step, n_labels);
+    }
+
+    fn note_step(&self, step: u64, n_labels: Option<u32>) {
         if let Err(error) = self.wait(self.inner.store.set_step(self.run, step, n_labels)) {
             tracing::error!(run.id = %self.run, "a run's progress could not be stored: {error}");
         }
@@ -169,15 +179,16 @@ impl Driver {
         }
     }
 
-    /// Keeps the line of the moment in memory; the store hears of it when its kind changes.
-    fn show(&self, line: &StateLine) {
+    /// Keeps the line of the moment in memory; the store hears of it when its kind changes, which
+    /// is what it returns.
+    fn show(&self, line: &StateLine) -> bool {
         let is_new = {
             let mut now = lock(&self.now);
             now.line = Some(line.clone());
             now.stored.replace(line.kind) != Some(line.kind)
         };
         if !is_new {
-            return;
+            return false;
         }
         let stored =
             self.inner
@@ -186,6 +197,7 @@ impl Driver {
         if let Err(error) = self.wait(stored) {
             tracing::error!(run.id = %self.run, "a run's state could not be stored: {error}");
         }
+        true
     }
 
     fn wait<T>(&self, work: impl Future<Output = T>) -> T {

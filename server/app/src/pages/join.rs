@@ -29,6 +29,9 @@ struct JoinPage {
     n_pairs: u32,
 }
 
+/// What the cookie says by which a browser shows that it keeps them.
+const KEPT: &str = "yes";
+
 #[derive(Template)]
 #[template(path = "return.html")]
 struct ReturnPage {
@@ -58,6 +61,7 @@ pub struct Door {
 /// A store that cannot be read.
 pub async fn page(
     State(app): State<AppState>,
+    headers: HeaderMap,
     Query(door): Query<Door>,
 ) -> Result<Response, Problem> {
     let Some(code) = door.code else {
@@ -76,7 +80,8 @@ pub async fn page(
     let file = parse_study(&row).map_err(|error| Problem::unusable_study(error.to_string()))?;
     let tasks: Vec<&str> = file.tasks.iter().map(|task| title(task)).collect();
     let (counted, practice, extra) = file.n_pairs();
-    Ok(show(&JoinPage {
+    let kept = Cookie::Kept.set(&headers, &Secret::brought(KEPT));
+    let page = show(&JoinPage {
         code,
         consent: to_html(&file.consent),
         guidance: to_html(&file.guidance),
@@ -84,7 +89,8 @@ pub async fn page(
         tasks: tasks.join(", "),
         n_pairs: counted + practice + extra,
         title: file.title,
-    }))
+    });
+    Ok(([(header::SET_COOKIE, kept)], page).into_response())
 }
 
 fn turned_away(trouble: LinkTrouble) -> ReturnPage {
@@ -130,7 +136,8 @@ pub struct EnterForm {
     agrees: Option<String>,
 }
 
-/// `POST /join`: uses the link up, and shows the return code.
+/// `POST /join`: uses the link up, and shows the return code. Not for a browser that did not keep
+/// the cookie of the page before: it would be forgotten at once, and the link be used up.
 ///
 /// # Errors
 /// No agreement; a store that cannot be written.
@@ -139,6 +146,13 @@ pub async fn enter(
     headers: HeaderMap,
     Form(form): Form<EnterForm>,
 ) -> Result<Response, Problem> {
+    if Cookie::Kept.brought(&headers).is_empty() {
+        return Ok(show(&ReturnPage {
+            heading: "This browser keeps no cookies",
+            told: "Without them your answers would have no name, so nothing was begun and your link still works. Allow cookies for this site and open the link again, or open it in another browser.".to_owned(),
+            can_go_on: true,
+        }));
+    }
     let entered = seats::enter(&app, &form.code, form.agrees.is_some()).await?;
     let cookie = Cookie::Labeler.set(&headers, &entered.browser);
     let page = show(&WelcomePage {

@@ -7,13 +7,13 @@ use axum::response::{IntoResponse as _, Redirect, Response};
 use domain::query::Question;
 use lab::words::thousands;
 use serde::Deserialize;
-use store::{RunRow, StudyRow};
+use store::{LabelerId, RunRow, StudyRow};
 
 use super::guidance::{Guidance, guidance, guidance_with, text};
 use super::join::nobody_here;
 use super::{show, title};
 use crate::api::labelers;
-use crate::extract::{Form, Run, labeler};
+use crate::extract::{Form, Query, Run, labeler};
 use crate::live::parse_study;
 use crate::problem::Problem;
 use crate::state::AppState;
@@ -23,6 +23,8 @@ use crate::state::AppState;
 struct LabelPage {
     /// The run's number.
     run: String,
+    /// Who answers: their number.
+    labeler: String,
     /// The task as people read it.
     task_title: &'static str,
     /// What the agent should learn, one sentence.
@@ -49,6 +51,14 @@ struct LabelPage {
 struct NamePage {
     /// The run's number.
     run: String,
+    /// A name was just said, and the browser did not keep who said it.
+    is_forgotten: bool,
+}
+
+/// `?named`: where a name that was said leads.
+#[derive(Deserialize)]
+pub struct Arrival {
+    named: Option<String>,
 }
 
 /// What the form for the name sends.
@@ -65,33 +75,31 @@ pub struct NameForm {
 pub async fn page(
     State(app): State<AppState>,
     Run(run): Run,
+    Query(arrival): Query<Arrival>,
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
     let labeler = labeler(&app, &headers).await?;
+    let seat = match &labeler {
+        Some(who) => app.store.seat_of(who.id).await?,
+        None => None,
+    };
     if let Some(study) = run.study {
-        let seat = match labeler {
-            Some(who) => app.store.seat_of(who.id).await?,
-            None => None,
-        };
         let seat = seat.filter(|(row, _, parts)| {
             row.id == study && parts.iter().any(|part| part.run == run.id)
         });
-        return match seat {
-            Some((study, ..)) => Ok(show(&of_study(&run, &study)?)),
-            None => Ok(nobody_here(StatusCode::NOT_FOUND)),
+        return match (labeler, seat) {
+            (Some(who), Some((study, ..))) => Ok(show(&of_study(&run, who.id, &study)?)),
+            _ => Ok(nobody_here(StatusCode::NOT_FOUND)),
         };
     }
-    // Whoever was invited to a study says another name for anything else.
-    let has_name = match labeler {
-        Some(labeler) => app.store.seat_of(labeler.id).await?.is_none(),
-        None => false,
-    };
-    if !has_name {
-        return Ok(show(&NamePage {
+    match labeler {
+        // Whoever was invited to a study says another name for anything else.
+        Some(who) if seat.is_none() => Ok(show(&filled_in(&run, who.id))),
+        _ => Ok(show(&NamePage {
             run: run.id.to_string(),
-        }));
+            is_forgotten: arrival.named.is_some(),
+        })),
     }
-    Ok(show(&filled_in(&run)))
 }
 
 /// `POST /runs/{id}/label`: the name, kept in a cookie for a year.
@@ -106,12 +114,12 @@ pub async fn sign_in(
     Form(form): Form<NameForm>,
 ) -> Result<Response, Problem> {
     let (cookie, _) = labelers::sign_in(&app, &headers, &form.name).await?;
-    let to = Redirect::to(&format!("/runs/{}/label", run.id));
+    let to = Redirect::to(&format!("/runs/{}/label?named", run.id));
     Ok(([(header::SET_COOKIE, cookie)], to).into_response())
 }
 
 /// The page with the study's own words above the task's.
-fn of_study(run: &RunRow, study: &StudyRow) -> Result<LabelPage, Problem> {
+fn of_study(run: &RunRow, who: LabelerId, study: &StudyRow) -> Result<LabelPage, Problem> {
     let file = parse_study(study).map_err(|error| Problem::unusable_study(error.to_string()))?;
     let is_about_stages = study.question == Question::SameStage;
     let words = if is_about_stages && !file.guidance.trim().is_empty() {
@@ -119,7 +127,7 @@ fn of_study(run: &RunRow, study: &StudyRow) -> Result<LabelPage, Problem> {
     } else {
         guidance_with(&file.guidance, &run.task)
     };
-    let page = with_guidance(run, &words);
+    let page = with_guidance(run, who, &words);
     Ok(LabelPage {
         question: match study.question {
             Question::Preference => "preference",
@@ -130,14 +138,15 @@ fn of_study(run: &RunRow, study: &StudyRow) -> Result<LabelPage, Problem> {
     })
 }
 
-fn filled_in(run: &RunRow) -> LabelPage {
-    with_guidance(run, &guidance(&run.task))
+fn filled_in(run: &RunRow, who: LabelerId) -> LabelPage {
+    with_guidance(run, who, &guidance(&run.task))
 }
 
-fn with_guidance(run: &RunRow, guidance: &Guidance) -> LabelPage {
+fn with_guidance(run: &RunRow, who: LabelerId, guidance: &Guidance) -> LabelPage {
     let task = sim::tasks::task(&run.task).ok();
     LabelPage {
         run: run.id.to_string(),
+        labeler: who.0.to_string(),
         task_title: title(&run.task),
         aim: task.map_or("", |task| task.summary),
         stages: task.map_or_else(String::new, stages_in_words),

@@ -69,6 +69,7 @@ fn forward(path: &str, status: u16) -> (String, &'static str) {
         }
         (Some("join" | "seat"), _, _) => ("/join".to_owned(), "Enter a return code"),
         (Some("experiments"), Some(_), _) => ("/experiments".to_owned(), "Experiments"),
+        (Some("labels"), None, _) => ("/labels".to_owned(), "All answers"),
         _ => ("/".to_owned(), "Tasks and runs"),
     }
 }
@@ -91,5 +92,6 @@ mod tests {
         assert_eq!(forward("/studies/3/invitations", 422).0, "/studies/3");
         assert_eq!(forward("/nowhere", 404).0, "/");
         assert_eq!(forward("/experiments/nowhere", 404).0, "/experiments");
+        assert_eq!(forward("/labels", 422).0, "/labels");
     }
 }

@@ -4,9 +4,10 @@ use askama::Template;
 use axum::extract::State;
 use axum::response::{Redirect, Response};
 use lab::words::thousands;
-use store::{AnsweredPair, DemonstrationRow, EventRow, RunId};
+use store::{AnsweredPair, DemonstrationRow, EventRow, LabelsOf, RunId};
 
 use super::home::method_name;
+use super::labels::answer_words;
 use super::{percent, show, time_of_day, title};
 use crate::api::clips::address;
 use crate::api::runs::{self, RunView};
@@ -17,6 +18,8 @@ use crate::state::AppState;
 
 pub mod map;
 
+/// Pairs on the page that labelers' pages passed over.
+pub(super) const N_PASSED_OVER: u32 = 12;
 /// Answered pairs on the page.
 const N_PAIRS: u32 = 6;
 
@@ -291,8 +294,9 @@ async fn last_success(app: &AppState, run: RunId) -> Result<Option<f64>, Problem
     Ok(last.and_then(|event| event["success_rate"].as_f64()))
 }
 
-/// What the researcher should know about: no clips at the moment, pairs without clips, and what of
-/// the run's own files was damaged.
+/// What the researcher should know about: no clips at the moment, pairs without clips, pairs that
+/// labelers' pages could not show, answers that came too late, and what of the run's own files was
+/// damaged.
 async fn broken(app: &AppState, run: RunId) -> Result<Vec<String>, Problem> {
     let bad = app.store.bad_queries(run).await?;
     let kinds = [DAMAGED_CHECKPOINT, DAMAGED_HISTORY];
@@ -304,9 +308,40 @@ async fn broken(app: &AppState, run: RunId) -> Result<Vec<String>, Problem> {
             query.trouble
         )
     });
+    let passed_over = app
+        .store
+        .passed_over(LabelsOf::Run(run), N_PASSED_OVER)
+        .await?;
+    let passed_over = passed_over.iter().map(|pair| {
+        format!(
+            "A pair of round {} could not be shown to {} and was passed over: {}.",
+            pair.session + 1,
+            pair.labeler,
+            pair.reason
+        )
+    });
+    let late = late(app.store.n_late_answers(run).await?);
     let trouble = app.live.clip_trouble();
     let damaged = damaged.iter().map(damage);
-    Ok(trouble.into_iter().chain(bad).chain(damaged).collect())
+    Ok(trouble
+        .into_iter()
+        .chain(bad)
+        .chain(passed_over)
+        .chain(late)
+        .chain(damaged)
+        .collect())
+}
+
+/// Answers that were kept aside, in words.
+fn late(n: u32) -> Option<String> {
+    let (answers, are) = match n {
+        0 => return None,
+        1 => ("1 answer".to_owned(), "is"),
+        n => (format!("{} answers", thousands(n.into())), "are"),
+    };
+    Some(format!(
+        "{answers} came too late, when somebody else had the pair or it was withdrawn: {are} kept aside, and not learned from."
+    ))
 }
 
 /// An event of a damaged file, in words.
@@ -342,12 +377,7 @@ fn pair(row: &AnsweredPair) -> Pair {
         right: address(&row.right),
         is_left: row.answer == "left",
         is_right: row.answer == "right",
-        answer: match row.answer.as_str() {
-            "left" => "left is better",
-            "right" => "right is better",
-            "equal" => "about the same",
-            _ => "passed over",
-        },
+        answer: answer_words(&row.answer),
         who: format!("round {}, {}", row.session + 1, time_of_day(&row.stored_at)),
     }
 }

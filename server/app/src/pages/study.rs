@@ -5,8 +5,9 @@ use axum::extract::State;
 use axum::http::HeaderMap;
 use axum::response::{IntoResponse as _, Redirect, Response};
 use serde::Deserialize;
-use store::{ItemLine, StudyRow};
+use store::{ItemLine, LabelsOf, StudyRow};
 
+use super::run::N_PASSED_OVER;
 use super::studies::{message, question_words};
 use super::{show, title};
 use crate::api::studies::{self as api, DAYS, SeatView};
@@ -187,7 +188,17 @@ async fn filled_in(
             n_wanted: own.len() as u32 * file.labelers_per_item,
         }
     });
-    let broken: Vec<String> = items.iter().filter_map(broken).collect();
+    let passed_over = app
+        .store
+        .passed_over(LabelsOf::Study(study.id), N_PASSED_OVER)
+        .await?;
+    let passed_over = passed_over.iter().map(|pair| {
+        format!(
+            "pair {}: could not be shown to {} and was passed over: {}",
+            pair.query_id, pair.labeler, pair.reason
+        )
+    });
+    let broken: Vec<String> = items.iter().filter_map(broken).chain(passed_over).collect();
     let seats: Vec<SeatLine> = view.seats.iter().map(seat_line).collect();
     Ok(show(&StudyPage {
         id: study.id.to_string(),
@@ -233,6 +244,10 @@ fn seat_line(seat: &SeatView) -> SeatLine {
         state,
         answered: seat.answered,
         budget: seat.budget.max(1),
-        answers: format!("{} of {}", seat.answered, seat.budget),
+        // Nothing is asked of anybody until they sit down.
+        answers: match seat.budget {
+            0 => String::new(),
+            budget => format!("{} of {budget}", seat.answered),
+        },
     }
 }

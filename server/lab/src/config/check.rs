@@ -89,6 +89,24 @@ impl RunConfig {
         self.check_sizes()
     }
 
+    /// Whether what the budget pays for is asked before the run ends.
+    ///
+    /// No part of [`RunConfig::check`]: a tree that a run saved is read whatever it asked.
+    ///
+    /// # Errors
+    /// A first session that the run does not come to.
+    pub(super) fn check_asks(&self) -> Result<(), ConfigError> {
+        let (first_step, total_steps) = (self.feedback.first_step, self.training.total_steps);
+        let asks = self.feedback.budget > 0 && method::build(self)?.sampler.is_some();
+        require(
+            !asks || first_step < total_steps,
+            "feedback.first_step",
+            &first_step,
+            "below training.total_steps, or nothing is ever asked; where that is meant, \
+             feedback.budget is 0",
+        )
+    }
+
     fn check_training(&self) -> Result<(), ConfigError> {
         let (t, f) = (&self.training, &self.feedback);
         let updates = [("training.updates_per_step", t.updates_per_step)];

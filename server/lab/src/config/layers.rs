@@ -11,7 +11,7 @@ use crate::method;
 /// Where settings come from, least important first.
 #[derive(Debug, Clone, Default)]
 pub struct Layers {
-    /// A task's name.
+    /// A task's name; `None` leaves it to the file.
     pub task: Option<String>,
     /// A method's name.
     pub method: Option<String>,
@@ -49,6 +49,9 @@ impl RunConfig {
             .iter()
             .map(|o| parse_override(origin, o))
             .collect::<Result<Vec<_>, _>>()?;
+        for (setting, layer) in layers.overrides.iter().zip(&overrides) {
+            refuse_another(origin, setting, layer, layers)?;
+        }
         let mut chosen = Table::new();
         for layer in file.iter().chain(&overrides) {
             merge(&mut chosen, layer);
@@ -58,7 +61,7 @@ impl RunConfig {
                 .clone()
                 .or_else(|| chosen.get(key).and_then(Value::as_str).map(str::to_owned))
         };
-        let task = named("task", &layers.task).unwrap_or_else(|| Self::default().task);
+        let task = named("task", &layers.task).ok_or_else(|| no_task(layers))?;
         let method = named("method", &layers.method).unwrap_or_else(|| Self::default().method);
         find_task(&task)?;
         method::find(&method)?;
@@ -80,7 +83,50 @@ impl RunConfig {
                 message: plainly(e.message()),
             })?;
         config.check()?;
+        config.check_asks()?;
         Ok(config)
+    }
+}
+
+/// Which of `task`, `method` and `seed` a setting names. Each has a place of its own, and named
+/// twice it would count once.
+pub fn identity(setting: &str) -> Option<&'static str> {
+    let layer = parse_override("--set", setting).ok()?; // what is none is told when it is resolved
+    let names = ["task", "method", "seed"];
+    names.into_iter().find(|name| layer.contains_key(*name))
+}
+
+/// Refuses a setting that names another task or method than the run has: it would be passed over.
+fn refuse_another(
+    origin: &str,
+    setting: &str,
+    layer: &Table,
+    layers: &Layers,
+) -> Result<(), ConfigError> {
+    for (key, named) in [("task", &layers.task), ("method", &layers.method)] {
+        let (Some(named), Some(other)) = (named, layer.get(key).and_then(Value::as_str)) else {
+            continue;
+        };
+        if named != other {
+            return Err(ConfigError::Invalid {
+                origin: format!("{origin} {setting}"),
+                message: format!("the {key} is {named} already; name {other} in its place"),
+            });
+        }
+    }
+    Ok(())
+}
+
+/// There is no task by default: hours of another one than was meant would go unnoticed.
+fn no_task(layers: &Layers) -> ConfigError {
+    let file = layers.file.as_ref();
+    ConfigError::Invalid {
+        origin: file
+            .map_or("settings", |(name, _)| name.as_str())
+            .to_owned(),
+        message: "no task is named; write task = \"window-open\" at the top of the file, or name \
+                  one on the command line"
+            .into(),
     }
 }
 

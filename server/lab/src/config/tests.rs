@@ -4,6 +4,7 @@ use learn::temporal::ContrastiveLoss;
 
 fn layers(presets: &[&str], overrides: &[&str]) -> Layers {
     Layers {
+        task: Some("go-fetch-return".into()),
         presets: presets.iter().map(ToString::to_string).collect(),
         overrides: overrides.iter().map(ToString::to_string).collect(),
         ..Layers::default()
@@ -194,6 +195,74 @@ fn a_wrong_key_is_named_with_its_line_and_the_nearest_right_one() {
         text.contains("my.toml: line 4") && text.contains("did you mean `budget`"),
         "{text}"
     );
+}
+
+#[test]
+fn a_file_that_names_no_task_is_told_to_and_one_that_does_has_its_task() {
+    let of = |text: &str| {
+        let file = Some(("my.toml".to_owned(), text.to_owned()));
+        RunConfig::resolve(&Layers {
+            file,
+            ..Layers::default()
+        })
+    };
+    let told = of("seed = 3\n").unwrap_err().to_string();
+    assert!(told.starts_with("my.toml: no task is named"), "{told}");
+    assert_eq!(of("task = \"window-open\"\n").unwrap().task, "window-open");
+}
+
+#[test]
+fn a_setting_that_names_another_task_or_method_is_not_passed_over() {
+    let of = |setting: &str| {
+        RunConfig::resolve(&Layers {
+            method: Some("stair".into()),
+            ..layers(&[], &[setting])
+        })
+    };
+    for (setting, named) in [
+        ("task=window-open", "go-fetch-return already"),
+        ("method=pebble", "stair already"),
+    ] {
+        let told = of(setting).unwrap_err().to_string();
+        assert!(told.starts_with(&format!("--set {setting}: ")), "{told}");
+        assert!(told.contains(named), "{told}");
+    }
+    assert!(of("method=stair").is_ok());
+    let whose = [
+        "task=x",
+        "method = 'x'",
+        "seed=7",
+        "agent.batch=7",
+        "seed=x",
+    ]
+    .map(identity);
+    assert_eq!(
+        whose,
+        [Some("task"), Some("method"), Some("seed"), None, None]
+    );
+}
+
+#[test]
+fn a_run_that_ends_before_its_first_question_is_refused_unless_it_is_to_ask_none() {
+    let at_its_end = ["training.total_steps=5000", "feedback.first_step=5000"];
+    let told = RunConfig::resolve(&layers(&[], &at_its_end)).unwrap_err();
+    let told = told.to_string();
+    assert!(told.contains("feedback.first_step is 5000"), "{told}");
+    for more in ["training.total_steps=5001", "feedback.budget=0"] {
+        let settings = [at_its_end[0], at_its_end[1], more];
+        assert!(
+            RunConfig::resolve(&layers(&[], &settings)).is_ok(),
+            "{more}"
+        );
+    }
+    let asks_nobody = Layers {
+        method: Some("sac".into()),
+        ..layers(&[], &at_its_end)
+    };
+    let mut config = RunConfig::resolve(&asks_nobody).unwrap();
+    config.method = "stair".into();
+    let saved = RunConfig::parse("saved", &config.to_toml());
+    assert!(saved.is_ok(), "what an earlier program began can be read");
 }
 
 #[test]

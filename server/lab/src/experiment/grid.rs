@@ -9,7 +9,7 @@ use std::collections::BTreeSet;
 use toml::Spanned;
 
 use crate::config::{
-    ConfigError, Layers, RunConfig, find_task, find_teacher, preset_names, unknown,
+    ConfigError, Layers, RunConfig, find_task, find_teacher, identity, preset_names, unknown,
 };
 use crate::method;
 
@@ -339,6 +339,13 @@ impl Reader<'_> {
                 all.iter().map(Some).collect()
             });
         };
+        if let Some(name) = named.get_ref().first().filter(|_| all.is_empty()) {
+            let reason = format!(
+                "there is no setting '{}': the file has no [[setting]]",
+                name.get_ref()
+            );
+            return Err(self.misfit(name.span().start, &reason));
+        }
         let find = |name: &str| all.iter().find(|s| s.name.get_ref() == name);
         let names = self.names(Some(named), "settings", |name| {
             let known = all.iter().map(|s| s.name.get_ref().as_str());
@@ -416,14 +423,21 @@ impl Reader<'_> {
                 return Err(self.misfit(preset.span().start, &error));
             }
         }
+        for set in written().flat_map(|(_, set)| set) {
+            if let Some(name) = identity(set.get_ref()) {
+                let reason = format!("{name} is no setting here; name {name}s under [axes]");
+                return Err(self.misfit(set.span().start, &reason));
+            }
+        }
         // One line alone is wrong, or a value that only the whole tree can judge.
-        RunConfig::resolve(layers).map_err(|error| {
+        let resolve = |layers: &Layers| RunConfig::resolve_from("set", layers);
+        resolve(layers).map_err(|error| {
             let alone = |set: &&Spanned<String>| {
                 let layers = Layers {
                     overrides: vec![set.get_ref().clone()],
                     ..layers.clone()
                 };
-                RunConfig::resolve(&layers).is_err()
+                resolve(&layers).is_err()
             };
             let line = written().flat_map(|(_, set)| set).find(alone);
             let named = |name: &Option<String>| name.clone().unwrap_or_default();

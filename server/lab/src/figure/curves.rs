@@ -15,7 +15,7 @@ use crate::method::rank;
 pub(super) const ENTRY: FigureEntry = FigureEntry {
     name: "curves",
     summary: "learning curves by task and method, every seed thin behind their mean",
-    input: "task, method, seed, setting, teacher, step, labels, budget, success_rate, return_mean, wall_s; or the folders of runs",
+    input: "task, method, seed, setting, teacher, step, labels, budget, success_rate, return_mean, wall_s; or the folders of runs or experiments",
     choices: &["x", "y", "center"],
     make,
 };

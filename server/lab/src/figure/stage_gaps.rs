@@ -16,7 +16,8 @@ use crate::experiment::grid::RunKey;
 use crate::experiment::results::{Content, Row};
 use crate::method;
 
-const INPUT: &str = "the results of an experiment, from methods that have a stage gap";
+const INPUT: &str =
+    "the results or the folder of an experiment, from methods that have a stage gap";
 
 pub(super) const ENTRY: FigureEntry = FigureEntry {
     name: "stage-gaps",

@@ -97,7 +97,8 @@ impl Run {
     /// [`RunError`]; nothing is changed.
     pub fn resume_on(folder: &Path, device: Option<&str>) -> Result<(Self, Vec<String>), RunError> {
         let (run_folder, text) = RunFolder::open(folder)?;
-        let mut config = RunConfig::parse("config.toml", &text)?;
+        let settings = folder.join("config.toml");
+        let mut config = RunConfig::parse(&settings.display().to_string(), &text)?;
         if let Some(device) = device {
             device.clone_into(&mut config.device);
         }

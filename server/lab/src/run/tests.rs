@@ -229,7 +229,8 @@ fn rime_keeps_its_critics_and_centres_novelty() {
 #[test]
 fn rimes_rewards_begin_with_novelty_and_no_others_do() {
     let rewards = |method, more: &[&str]| {
-        let more = [&["training.total_steps=250"], more].concat();
+        let unasked = ["training.total_steps=250", "feedback.budget=0"];
+        let more = [&unasked[..], more].concat();
         let trained = Trained::new(method, &more);
         let replay = &trained.run.replay;
         let state = replay.observation(replay.complete_episodes()[0], 5);

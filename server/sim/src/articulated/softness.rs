@@ -47,7 +47,7 @@ impl Softness {
         }
     }
 
-    /// Two parabolas that meet in the middle of `width`; never quite 0 or 1.
+    /// Two parabolas that meet in the middle of `width`; neither end is quite 0 or 1.
     fn impedance(&self, depth: f64) -> f64 {
         let x = (depth / self.width).min(1.0);
         let rise = if x <= 0.5 {
@@ -55,7 +55,8 @@ impl Softness {
         } else {
             1.0 - 2.0 * (1.0 - x) * (1.0 - x)
         };
-        (self.at_touch + rise * (self.deep - self.at_touch)).clamp(1e-4, 0.9999)
+        let [at_touch, deep] = [self.at_touch, self.deep].map(|end| end.clamp(1e-4, 0.9999));
+        at_touch + rise * (deep - at_touch)
     }
 }
 
@@ -79,6 +80,20 @@ mod tests {
         assert!((at(0.00025) - 0.90625).abs() < 1e-12);
         assert!((at(0.001) - 0.95).abs() < 1e-12);
         assert!((at(0.5) - 0.95).abs() < 1e-12);
+    }
+
+    /// A stop that is all soft where it begins: its impedance rises from the least there is, so
+    /// that a shallow violation lies above that and not at it.
+    #[test]
+    fn the_ends_of_the_impedance_are_kept_from_0_and_1_before_it_rises() {
+        let stop = Softness {
+            at_touch: 0.0,
+            deep: 1.0,
+            ..CONTACT
+        };
+        assert!((stop.impedance(0.0) - 1e-4).abs() < 1e-15);
+        assert!((stop.impedance(0.000_05) - (1e-4 + 0.005 * 0.9998)).abs() < 1e-12);
+        assert!((stop.impedance(0.001) - 0.9999).abs() < 1e-12);
     }
 
     #[test]

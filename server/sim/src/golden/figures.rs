@@ -197,9 +197,18 @@ impl Figures {
         Self {
             success: first.len() as f64 / n,
             task_return: rollouts.iter().map(|r| r.task_return).sum::<f64>() / n,
-            first_success: first
-                .get(first.len() / 2)
-                .map_or(0.0, |step| f64::from(*step)),
+            first_success: median(&first),
+        }
+    }
+}
+
+/// The middle of sorted steps, of an even number the mean of the middle two; 0 of none.
+fn median(steps: &[u32]) -> f64 {
+    match steps {
+        [] => 0.0,
+        steps => {
+            let [below, above] = [(steps.len() - 1) / 2, steps.len() / 2];
+            f64::midpoint(f64::from(steps[below]), f64::from(steps[above]))
         }
     }
 }

@@ -44,7 +44,7 @@ impl Kind {
 }
 
 /// Which original a line is from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Deserialize)]
 enum Version {
     /// MuJoCo 2.1.0. Positions are read one substep before joint values.
     #[serde(rename = "v2")]
@@ -84,6 +84,7 @@ impl Version {
 /// What names an episode in every line of it.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Deserialize)]
 struct EpisodeKey {
+    ver: Version,
     #[serde(default)]
     task: String,
     #[serde(default)]
@@ -94,7 +95,6 @@ struct EpisodeKey {
 
 #[derive(Deserialize)]
 struct Transition {
-    ver: Version,
     #[serde(flatten)]
     episode: EpisodeKey,
     t: i64,
@@ -140,7 +140,6 @@ struct Reset {
 
 #[derive(Deserialize)]
 struct TrajectoryStep {
-    ver: Version,
     #[serde(flatten)]
     episode: EpisodeKey,
     t: i64,
@@ -230,10 +229,10 @@ fn check_transition(
     before: &mut StepsBefore,
 ) -> Result<Checks, String> {
     let theirs = observation_of(&line.obs)?;
-    let before_substep = |(q, qd): (&f64, &f64)| q - line.ver.lag_s() * qd;
+    let before_substep = |(q, qd): (&f64, &f64)| q - line.episode.ver.lag_s() * qd;
     let joints = line.q.iter().zip(&line.qd).map(before_substep).collect();
     let rebuilt = (task.rebuild)(&Recorded {
-        hand: line.ver.shown(line.hand),
+        hand: line.episode.ver.shown(line.hand),
         tcp: line.tcp,
         openness: metaworld::openness(line.lc, line.rc),
         pads: line
@@ -256,7 +255,11 @@ fn check_transition(
         .map(|last| last.moment);
     let ours = metaworld::observation(&rebuilt.moment, &step_before.unwrap_or(rebuilt.moment));
 
-    let mut checks = Checks::new(format!("{} {} transitions", task.name, line.ver.name()));
+    let mut checks = Checks::new(format!(
+        "{} {} transitions",
+        task.name,
+        line.episode.ver.name()
+    ));
     let judgement = rebuilt.judgement;
     checks.number("reward", judgement.reward, line.r, REWARD_TOLERANCE);
     checks.flag("success", judgement.success, line.success);
@@ -355,7 +358,11 @@ fn check_trajectory(
     line: &TrajectoryStep,
     before: &mut StepsBefore,
 ) -> Result<Checks, String> {
-    let mut checks = Checks::new(format!("{} {} trajectories", task.name, line.ver.name()));
+    let mut checks = Checks::new(format!(
+        "{} {} trajectories",
+        task.name,
+        line.episode.ver.name()
+    ));
     let object = line
         .obj
         .first_chunk()

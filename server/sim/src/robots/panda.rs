@@ -53,7 +53,8 @@ impl Panda {
         let base = world.insert_body(base);
         for solid in look::pedestal() {
             let collider = solid.collider().expect("the pedestal has a volume");
-            world.insert_collider(collider.collision_groups(groups), Some(base));
+            let collider = collider.friction(1.0).collision_groups(groups);
+            world.insert_collider(collider, Some(base));
         }
         let mut links = [base; N_JOINTS];
         let frames = links::frames(q);
@@ -126,7 +127,8 @@ impl Panda {
         &self.links
     }
 
-    /// Sets the servos for the coming world step: towards `targets`, carrying the arm's weight.
+    /// Sets the servos for the coming world step: towards `targets`, as far as each joint takes
+    /// commands, carrying the arm's weight.
     ///
     /// # Panics
     /// In a world that is not the arm's.
@@ -135,7 +137,9 @@ impl Panda {
         let load = links::gravity_load(&links::frames(&q));
         let multibody = self.multibody_mut(&mut world.multibody_joints);
         for (i, links::Link { motion, drive, .. }) in LINKS.iter().enumerate() {
-            let pull = (drive.gain * (targets[i] - q[i])).clamp(-drive.strongest, drive.strongest);
+            let [lowest, highest] = drive.command;
+            let ahead = targets[i].clamp(lowest, highest) - q[i];
+            let pull = (drive.gain * ahead).clamp(-drive.strongest, drive.strongest);
             let rest = q[i] + (pull + load[i]) / drive.gain;
             let link = multibody.link_mut(i + 1).expect(BUILT);
             let axis = free_axis(*motion);
@@ -175,11 +179,13 @@ impl Panda {
 
 const BUILT: &str = "the arm's links were joined when it was built";
 
-/// What the servos aim at for one control step: the end effector 1 cm further along the action,
-/// the wrist a little further, the fingers at a width.
+/// What an action asks of the joints for one control step: the end effector 1 cm further along
+/// it, the wrist a little further, the fingers at a width.
 ///
 /// `action` is in [−1, 1]⁵. All leads start at the present joints `q`, so what lags behind is
-/// never made up for.
+/// never made up for. Wrist and fingers are kept to what their servos take; joints 1–6 may be
+/// asked for more than that, as in the original, where only the servo ([`Panda::hold`]) keeps
+/// them.
 pub fn targets(q: &[f64; N_JOINTS], action: &[f64; ACTION_SIZE]) -> [f64; N_JOINTS] {
     let here = links::end_effector(&links::frames(q));
     let there = std::array::from_fn(|i| here[i] + LEAD_M * action[i]);
@@ -188,7 +194,7 @@ pub fn targets(q: &[f64; N_JOINTS], action: &[f64; ACTION_SIZE]) -> [f64; N_JOIN
     let width = 0.02 * (action[4] + 1.0);
     targets[WRIST + 1] = width;
     targets[WRIST + 2] = width;
-    for (target, link) in targets.iter_mut().zip(&LINKS) {
+    for (target, link) in targets.iter_mut().zip(&LINKS).skip(WRIST) {
         let [lowest, highest] = link.drive.command;
         *target = target.clamp(lowest, highest);
     }

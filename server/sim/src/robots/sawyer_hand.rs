@@ -5,8 +5,9 @@
 //! steps behind, as a mass on a damped spring of 8180 N/m.
 //!
 //! Differs from the original: the hand never tilts (there up to 4° in free motion, 2.3° per N·m), one gain
-//! serves all directions, and what pushes a finger reaches the hand whole, however the finger
-//! gives way.
+//! serves all directions, what pushes a finger reaches the hand whole, however the finger
+//! gives way, and the 3 mm of a finger behind its pad have the pad's friction of 2 (there 1, which
+//! is felt where the back of the fist hooks something, as in door-open).
 //! Source: METAWORLD.md 1.1, 1.5, 1.6.
 
 use domain::scene::{Geometry, Material, Shape, Transform};

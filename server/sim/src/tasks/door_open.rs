@@ -146,12 +146,16 @@ fn openness(angle: f64) -> f64 {
 // ── Setup ──────────────────────────────────────────────────────────────────────────────────
 
 /// The leaf, in the frame of its hinge.
-const LEAF_PARTS: [Part; 7] = [
+const LEAF_PARTS: [Part; 5] = [
     cuboid([0.185, 0.0, 0.0], [0.18, 0.01, 0.123], STEEL),
     cylinder([0.325, -0.006, 0.0], Along::Y, 0.028, 0.012, HANDLE),
     cylinder([0.325, -0.065, 0.0], Along::Y, 0.013, 0.047, HANDLE),
     cylinder([0.381, -0.12, 0.0], Along::X, 0.019, 0.075, HANDLE),
     cylinder([0.395, -0.12, 0.0], Along::X, 0.023, 0.054, HANDLE),
+];
+
+/// The pins that it hangs on, in the same frame: seen, but nothing touches them.
+const PINS: [Part; 2] = [
     cylinder([0.0, 0.0, -0.07], Along::Z, 0.013, 0.045, HANDLE),
     cylinder([0.0, 0.0, 0.07], Along::Z, 0.013, 0.045, HANDLE),
 ];
@@ -270,7 +274,8 @@ fn expert(observation: &[f32]) -> Vec<f32> {
 
 fn scene() -> Scene {
     let cabinet = cabinet::PARTS.iter().map(|part| part.shape(OBJECT_BODY));
-    let leaf = LEAF_PARTS.iter().map(|part| part.shape(OBJECT_BODY + 1));
+    let leaf = LEAF_PARTS.iter().chain(&PINS);
+    let leaf = leaf.map(|part| part.shape(OBJECT_BODY + 1));
     picture::scene(
         tabletop::scenery(),
         cabinet.chain(leaf).collect(),

@@ -28,7 +28,8 @@
 //! # Success
 //! `‖h − T‖ ≤ 0.03`.
 //!
-//! Differs from the original: see `robots::sawyer_hand` and `tasks::assembly`.
+//! Differs from the original: the first observation shows this episode's drawer, shut (there a
+//! stale read shows the one before). See also `robots::sawyer_hand` and `tasks::assembly`.
 //! Source: METAWORLD.md 3.2 and 1.9, METAWORLD_EXPERTS.md.
 
 use domain::random::Rng;

@@ -31,7 +31,8 @@
 //! Differs from the original: the knob's stop is not as inert as there: with `assembly`'s soft
 //! stop the expert's fist, which does not slip off the handle here, would wind the knob on to
 //! 3.8 rad (recordings reach 2.28). For the same reason the handle may stay turned where
-//! there the fist pushes it back. See also `robots::sawyer_hand`.
+//! there the fist pushes it back. The first observation shows this episode's faucet, shut (there
+//! a stale read shows the one before). See also `robots::sawyer_hand`.
 //! Source: METAWORLD.md 3.6 and 1.9, METAWORLD_EXPERTS.md.
 
 use std::f64::consts::{PI, TAU};

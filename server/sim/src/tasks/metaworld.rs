@@ -3,6 +3,12 @@
 //!
 //! Observations and judgements are functions of plain values, [`Readings`]: the environments call
 //! them with what the physics says, `golden` with what the original environment recorded.
+//!
+//! Differs from the original: of its two versions the hand's response and the start of an episode
+//! are those of v2, and the moment that is read is v3's, the end of the control step (v2 reads
+//! positions 2.5 ms before it). In the first observation of an episode both moments are its own
+//! start (in v2 the earlier one is the last of the episode before).
+//! Source: METAWORLD.md 1.1–1.4.
 
 use std::fmt::Debug;
 

@@ -6,6 +6,7 @@ use std::time::Duration;
 use lab::config::find_task;
 use lab::cost::{core_time_here, on_cores};
 use lab::experiment::grid::{self, Grid, GridRun, SHIPPED};
+use lab::words::counted;
 
 use super::{Chosen, in_words};
 use crate::cli::say;
@@ -67,8 +68,8 @@ pub(super) fn list() -> anyhow::Result<ExitCode> {
 fn cost(grid: &Grid) -> String {
     let whole = on_cores(grid.runs.iter().map(time), CORES);
     format!(
-        "{} runs, about {} on {CORES} cores like this machine's",
-        grid.runs.len(),
+        "{}, about {} on {CORES} cores like this machine's",
+        counted(grid.runs.len() as u64, "run", "runs"),
         in_words(whole)
     )
 }

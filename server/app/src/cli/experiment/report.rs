@@ -8,7 +8,7 @@ use lab::experiment::report::{self, RowFile};
 use lab::experiment::results::read_rows;
 
 use super::write_with_picture;
-use crate::cli::BadInput;
+use crate::cli::{BadInput, out};
 
 /// Report what a grid came to: curves, tables, differences between methods
 #[derive(Debug, clap::Args)]
@@ -33,12 +33,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
         .iter()
         .map(|path| read(path))
         .collect::<Result<Vec<_>, _>>()?;
-    let artifacts = report::make(&files, args.mixed).map_err(BadInput::from_error)?;
-    let beside = || {
-        let first = file_of(&args.rows[0]);
-        first.parent().unwrap_or(Path::new("")).join("report")
-    };
+    let beside = || out::parent(&file_of(&args.rows[0])).join("report");
     let out = args.out.clone().unwrap_or_else(beside);
+    out::folder(&out)?;
+    let artifacts = report::make(&files, args.mixed).map_err(BadInput::from_error)?;
     for artifact in artifacts {
         write_with_picture(&out.join(artifact.name), artifact.text)?;
     }

@@ -9,12 +9,13 @@ use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
 use lab::experiment::results::GridFolder;
+use lab::words::counted;
 use learn::device::Device;
 
 use super::Chosen;
 use super::pool::{Pool, Tally};
-use crate::cli::BadInput;
 use crate::cli::interrupt::on_interrupt;
+use crate::cli::{BadInput, number, out};
 use crate::provenance::{REVISION, processors};
 
 /// How long to wait for runs of an earlier start to leave their checkpoints.
@@ -35,12 +36,13 @@ pub(super) struct Args {
     #[arg(long)]
     small: bool,
     /// Runs at once [default: one for each processor]
-    #[arg(long)]
+    #[arg(long, value_parser = number::at_least_one, allow_negative_numbers = true)]
     jobs: Option<NonZeroUsize>,
     /// Where all runs learn, cpu or cuda, whatever the file says
     #[arg(long)]
     device: Option<String>,
-    /// The experiment's folder [default: data/experiments/NAME]
+    /// The experiment's folder [default: data/experiments/NAME, with --small NAME-small; NAME is
+    /// that of the file, or of the folder of an experiment.toml]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Go on although finished runs are of another revision of the program
@@ -58,9 +60,13 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     }
     let named = || PathBuf::from("data/experiments").join(&chosen.stem);
     let out = args.out.clone().unwrap_or_else(named);
+    out::folder(&out)?;
     let folder = GridFolder::at(&out);
     let revision = (!args.mixed).then_some(REVISION);
-    folder.create()?;
+    folder
+        .check_experiment(&chosen.grid)
+        .map_err(BadInput::from_error)?;
+    folder.create().map_err(BadInput::from_error)?;
     let log = folder.log_file()?;
     hold(&log, &out)?;
     let results = folder.results().map_err(BadInput::from_error)?;
@@ -99,9 +105,9 @@ fn hold(log: &std::fs::File, out: &std::path::Path) -> anyhow::Result<()> {
 
 fn tell(tally: &Tally, out: &std::path::Path) -> ExitCode {
     println!(
-        "{} of {} runs are finished, {} of them before this start.",
+        "{} of {} finished, {} of them before this start.",
         tally.n_finished + tally.n_before,
-        tally.n_runs,
+        counted(tally.n_runs as u64, "run is", "runs are"),
         tally.n_before
     );
     for (name, reason) in &tally.failed {

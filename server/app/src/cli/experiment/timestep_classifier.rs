@@ -4,14 +4,13 @@ use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::Context as _;
 use lab::experiment::timestep_classifier::{
     N_EPISODES, Played, Progress, Settings, TASKS, run as watch,
 };
 use learn::timestep::TimestepConfig;
 
 use super::write_with_picture;
-use crate::cli::BadInput;
+use crate::cli::{BadInput, number, out};
 use crate::provenance::processors;
 
 /// Tell from a scripted expert's states at which step they were seen: the paper's evidence that
@@ -27,12 +26,14 @@ pub(super) struct Args {
     /// Episodes of each task, half of them held out [default: the paper's million steps]
     #[arg(long, default_value_t = N_EPISODES, hide_default_value = true)]
     #[arg(value_parser = clap::value_parser!(u32).range(2..=20_000))]
+    #[arg(allow_negative_numbers = true)]
     episodes: u32,
     /// Of the episodes, the initial weights and the order of states
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, value_parser = number::whole::<u64>)]
+    #[arg(allow_negative_numbers = true)]
     seed: u64,
     /// Threads, each at one task [default: one for each processor]; changes no number
-    #[arg(long)]
+    #[arg(long, value_parser = number::at_least_one, allow_negative_numbers = true)]
     threads: Option<NonZeroUsize>,
     /// Folder for what it makes
     #[arg(long, value_name = "DIR")]
@@ -56,10 +57,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
         n_threads: args.threads.unwrap_or_else(processors),
         classifier: TimestepConfig::default(),
     };
-    // Before minutes of work whose results would have no place.
-    std::fs::create_dir_all(&args.out)
-        .with_context(|| format!("cannot make the folder {}", args.out.display()))
-        .map_err(BadInput::from_error)?;
+    out::folder(&args.out)?;
     let n_epochs = settings.classifier.epochs;
     let tell = |progress: Progress| {
         eprintln!(

@@ -4,13 +4,14 @@
 use anyhow::{Context as _, bail};
 use domain::random::{Rng, Stream};
 use domain::teacher::{Judge, TeacherSettings};
+use lab::words::counted;
 use serde_json::{Value, json};
 
 use super::super::client::Client;
-use super::super::say;
 use super::super::teach::{Lease, TaskRewards, new_token, preference, same_stage};
 use super::super::train::judge;
-use super::remote::Which;
+use super::super::{number, say};
+use super::remote::{MOST_LABELERS, Which};
 
 /// Questions asked for at once: as many as a person's page may have.
 const LEASES: u32 = 20;
@@ -26,13 +27,20 @@ pub(super) struct Args {
     #[command(flatten)]
     which: Which,
     /// How many labelers
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 1,
+        allow_negative_numbers = true
+    )]
+    #[arg(value_parser = clap::value_parser!(u32).range(1..=MOST_LABELERS))]
     labelers: u32,
     /// Share of answers that are wrong, 0 to 0.5
-    #[arg(long, default_value_t = 0.0)]
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
     error: f64,
     /// Of the wrong answers
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, value_parser = number::whole::<u64>)]
+    #[arg(allow_negative_numbers = true)]
     seed: u64,
 }
 
@@ -45,7 +53,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let mut researcher = args.which.server.client()?;
     let request = json!({"count": args.labelers});
     let links = researcher.post(&path, &request)?;
-    let mut n = 0;
+    let mut n = 0_u32;
     for (number, link) in (0..).zip(links.as_array().into_iter().flatten()) {
         let link = link["link"].as_str().unwrap_or_default();
         let code = link.split_once("code=").map(|(_, code)| code);
@@ -61,8 +69,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         n += script.answer_all(&mut researcher, &mut labeler)?;
     }
     say(&format!(
-        "{} labelers answered {n} questions of study {}.\n",
-        args.labelers, args.which.study
+        "{} answered {} of study {}.\n",
+        counted(args.labelers.into(), "labeler", "labelers"),
+        counted(n.into(), "question", "questions"),
+        args.which.study
     ))
 }
 

@@ -3,8 +3,9 @@
 use std::path::PathBuf;
 
 use lab::study::{DEFAULT_QUERIES, PackedQueries};
+use lab::words::counted;
 
-use crate::cli::{BadInput, figure, say};
+use crate::cli::{BadInput, number, out, say};
 use crate::provenance::REVISION;
 
 #[derive(Debug, clap::Args)]
@@ -19,7 +20,8 @@ pub(super) struct Args {
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
     /// How many queries, spread evenly over sessions and over places in them
-    #[arg(long, default_value_t = DEFAULT_QUERIES)]
+    #[arg(long, default_value_t = DEFAULT_QUERIES, value_parser = number::whole::<usize>)]
+    #[arg(allow_negative_numbers = true)]
     n: usize,
 }
 
@@ -37,17 +39,18 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         let told = format!("{} must end in .queries", args.out.display());
         return Err(BadInput(told).into());
     }
+    out::file(&args.out)?;
     let packed = PackedQueries::of_run(&args.folder, Some(args.n), REVISION)
         .map_err(BadInput::from_error)?;
     let bytes = packed.pack();
-    figure::write(&args.out, &bytes)?;
+    out::write(&args.out, &bytes)?;
     say(&format!(
-        "{}: {} queries of {} on {}, {} steps each, {} kB\nMade by: {}\n",
+        "{}: {} of {} on {}, {} each, {} kB\nMade by: {}\n",
         args.out.display(),
-        packed.queries.len(),
+        counted(packed.queries.len() as u64, "query", "queries"),
         packed.method,
         packed.task,
-        packed.segment_len,
+        counted(packed.segment_len.into(), "step", "steps"),
         bytes.len().div_ceil(1000),
         packed.command,
     ))

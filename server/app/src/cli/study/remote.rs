@@ -6,16 +6,22 @@ use std::time::Duration;
 
 use anyhow::{Context as _, bail};
 use indicatif::{ProgressBar, ProgressStyle};
+use lab::words::counted;
 use serde_json::{Value, json};
 
 use super::super::client::{Client, path_segment};
 use super::super::export::write_to;
 use super::super::say;
 use super::read;
+use crate::api::studies::DAYS;
 use crate::label_table::TableFormat;
 
 /// How long a server may be away in the middle.
 const PATIENCE: Duration = Duration::from_mins(2);
+/// Labelers that are invited at once.
+pub(super) const MOST_LABELERS: i64 = 10_000;
+/// Where a server is unless somebody says otherwise.
+const HERE: &str = "http://127.0.0.1:8080";
 /// How often the number of drawn clips is asked for.
 const LOOK: Duration = Duration::from_millis(500);
 
@@ -33,7 +39,7 @@ pub(super) struct Which {
 #[derive(Debug, clap::Args)]
 pub(super) struct Server {
     /// The server's address
-    #[arg(long, value_name = "URL", default_value = "http://127.0.0.1:8080")]
+    #[arg(long, value_name = "URL", default_value = HERE)]
     pub(super) server: String,
     /// The server's token, where it listens on a network [default: STAIR_TOKEN]
     #[arg(long)]
@@ -45,6 +51,16 @@ impl Server {
         let mut client = Client::new(&self.server, PATIENCE)?;
         client.enter(self.token.as_deref());
         Ok(client)
+    }
+
+    /// The command that asks the same server; one that is where it always is needs no naming.
+    fn next(&self, command: &str) -> String {
+        let server = self.server.trim_end_matches('/');
+        if server == HERE {
+            command.to_owned()
+        } else {
+            format!("{command} --server {server}")
+        }
     }
 }
 
@@ -102,14 +118,12 @@ pub(super) fn prepare(args: &PrepareArgs) -> anyhow::Result<()> {
         client.post(&format!("{path}/open"), &json!({}))?;
     }
     let address = format!("{}/studies/{id}", args.server.server.trim_end_matches('/'));
-    let n = &study["n_items"];
-    let next = if args.open {
-        format!("stair study invite {id}")
-    } else {
-        format!("stair study open {id}")
-    };
+    let n_pairs = study["n_items"].as_u64().unwrap_or_default();
+    let action = if args.open { "invite" } else { "open" };
     say(&format!(
-        "Study {id} is ready: {n} pairs, {address}\nNext: {next}\n"
+        "Study {id} is ready: {}, {address}\nNext: {}\n",
+        counted(n_pairs, "pair", "pairs"),
+        args.server.next(&format!("stair study {action} {id}"))
     ))
 }
 
@@ -127,9 +141,8 @@ pub(super) fn open(args: &OpenArgs) -> anyhow::Result<()> {
         .client()?
         .post(&format!("{path}/open"), &json!({}))?;
     let id = &args.which.study;
-    say(&format!(
-        "Study {id} is open.\nNext: stair study invite {id}\n"
-    ))
+    let next = args.which.server.next(&format!("stair study invite {id}"));
+    say(&format!("Study {id} is open.\nNext: {next}\n"))
 }
 
 /// Make links for labelers; each works once
@@ -141,13 +154,25 @@ pub(super) struct InviteArgs {
     #[command(flatten)]
     which: Which,
     /// How many
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 1,
+        allow_negative_numbers = true
+    )]
+    #[arg(value_parser = clap::value_parser!(u32).range(1..=MOST_LABELERS))]
     labelers: u32,
     /// Days for which the links work
-    #[arg(long, default_value_t = crate::api::studies::DAYS.0)]
+    #[arg(long, default_value_t = DAYS.0, allow_negative_numbers = true)]
+    #[arg(value_parser = clap::value_parser!(u32).range(1..=i64::from(DAYS.1)))]
     days: u32,
     /// Instead: a new link for the labeler of this number
-    #[arg(long, value_name = "NUMBER", conflicts_with = "labelers")]
+    #[arg(
+        long,
+        value_name = "NUMBER",
+        conflicts_with = "labelers",
+        allow_negative_numbers = true
+    )]
     again: Option<u32>,
 }
 
@@ -248,15 +273,28 @@ pub(super) fn close(args: &CloseArgs) -> anyhow::Result<()> {
         .client()?
         .post(&format!("{path}/close"), &json!({}))?;
     let id = &args.which.study;
+    let next = args.which.server.next(&format!("stair study export {id}"));
     say(&format!(
-        "Study {id} is closed.\nNext: stair study export {id} --server {} --out answers.csv\n",
-        args.which.server.server
+        "Study {id} is closed.\nNext: {next} --out answers.csv\n"
     ))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_next_command_asks_the_same_server() {
+        let next = |server: &str| {
+            let (server, token) = (server.to_owned(), None);
+            Server { server, token }.next("stair study open 1")
+        };
+        assert_eq!(next(HERE), "stair study open 1");
+        assert_eq!(
+            next("http://127.0.0.1:9000/"),
+            "stair study open 1 --server http://127.0.0.1:9000"
+        );
+    }
 
     #[test]
     fn a_study_is_described_with_its_labelers() {

@@ -4,8 +4,10 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
+use lab::words::counted;
 
-use super::super::figure::{Format, encode, write};
+use super::super::figure::{Format, encode};
+use super::super::out::{self, write};
 use super::super::{BadInput, say};
 use crate::label_table::{self, TableFormat};
 use crate::study_results::{Results, results};
@@ -36,6 +38,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         .map_err(|error| BadInput(format!("cannot read {name}: {error}")))?;
     let labels = label_table::read(&bytes, format)
         .map_err(|error| BadInput(format!("{name} is no table of answers: {error}")))?;
+    out::folder(&args.out)?;
     let results = results(&labels);
     if results.n_answers == 0 {
         let told = format!("{name} holds no answers of a study that count");
@@ -61,7 +64,8 @@ fn keep(results: &Results, folder: &Path) -> anyhow::Result<()> {
 }
 
 fn table(results: &Results) -> String {
-    let mut text = format!("{} answers\n", results.n_answers);
+    let n_answers = counted(results.n_answers as u64, "answer", "answers");
+    let mut text = format!("{n_answers}\n");
     for measure in &results.measures {
         let (value, interval) = (measure.shown_value(), measure.shown_interval());
         // Writing to a String cannot fail.

@@ -132,6 +132,37 @@ fn an_unknown_name_is_told_with_its_line_and_the_nearest_right_one() {
 }
 
 #[test]
+fn what_is_an_axis_is_no_setting() {
+    for (set, axis) in [
+        ("method=pebble", "methods"),
+        ("task=window-open", "tasks"),
+        ("seed=77", "seeds"),
+    ] {
+        let told = told(&SMALL_TASK.replace("evaluation.episodes=50", set));
+        assert!(told.contains("line 4"), "{told}");
+        assert!(
+            told.contains(&format!("name {axis} under [axes]")),
+            "{told}"
+        );
+    }
+}
+
+#[test]
+fn a_setting_is_told_as_the_file_has_it_and_one_of_none_as_such() {
+    let told_set = told(&SMALL_TASK.replace("evaluation.episodes", "agent.bach"));
+    assert!(
+        told_set.contains("line 4: set agent.bach=50: "),
+        "{told_set}"
+    );
+    let (head, _) = SMALL_TASK.split_once("[[setting]]").unwrap();
+    let told_none = told(head);
+    assert!(
+        told_none.contains("line 14") && told_none.ends_with("the file has no [[setting]]"),
+        "{told_none}"
+    );
+}
+
+#[test]
 fn a_value_out_of_range_is_told_with_its_line() {
     let told = told(&SMALL_TASK.replace("evaluation.episodes=50", "evaluation.episodes=0"));
     assert!(

@@ -31,14 +31,30 @@ pub(super) fn estimate(found: &Estimate, is_rate: bool) -> String {
     format!("{} [{lo}, {hi}]", told(found.value))
 }
 
+/// Two digits of a rate, a whole number of anything else; what rounds to 0 has no sign.
 pub(super) fn number(value: f64, is_rate: bool) -> String {
-    if is_rate {
-        format!("{value:.2}")
-    } else {
-        format!("{value:.0}")
+    let digits = if is_rate { 2 } else { 0 };
+    let told = format!("{value:.digits$}");
+    match told.strip_prefix('-') {
+        Some(size) if size.bytes().all(|digit| matches!(digit, b'0' | b'.')) => size.to_owned(),
+        _ => told,
     }
 }
 
 pub(super) fn add(text: &mut String, more: impl AsRef<str>) {
     text.push_str(more.as_ref());
+}
+
+#[cfg(test)]
+mod tests {
+    use super::number;
+
+    #[test]
+    fn what_rounds_to_nothing_has_no_sign() {
+        assert_eq!(number(-0.004, true), "0.00");
+        assert_eq!(number(-0.4, false), "0");
+        assert_eq!(number(-0.006, true), "-0.01");
+        assert_eq!(number(-12.0, false), "-12");
+        assert_eq!(number(f64::NAN, true), "NaN");
+    }
 }

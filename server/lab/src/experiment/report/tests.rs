@@ -40,7 +40,7 @@ fn the_report_has_tables_curves_and_points_the_same_each_time() {
     assert_eq!(make(&files, false).unwrap(), artifacts);
     let report = &artifacts[0].text;
     for told in [
-        "| stair | – | 3,000 | 3 | 0.50 [0.50, 0.50] (last 3) | 1: 0.50, 2: 0.50, 3: 0.50 | 0.50 [0.50, 0.50] | 20 (2000) | 30 (3000) | 30 (3000) |",
+        "| stair | – | 3,000 | 3 | 0.50 [0.50, 0.50] (last 3) | 0.50 | 1: 0.50, 2: 0.50, 3: 0.50 | 0.50 [0.50, 0.50] | 20 (2000) | 30 (3000) | 30 (3000) |",
         "| 1: 0.25, 2: 0.17, 3: 0.17 |",
         // scores differ by 0.25, 0.33, 0.33: their mean, from the lowest to the highest seed
         "| stair − pebble | 3 | 0.31 [0.25, 0.33] |",

@@ -10,6 +10,7 @@
 //! log.jsonl             what runs said at their end; locked while any of them is up
 //! ```
 
+use std::collections::BTreeSet;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
@@ -19,9 +20,12 @@ use learn::durable;
 use super::settings::{first_difference, table, without_seed};
 use super::{Content, Results, Row, fingerprint};
 use crate::config::{ConfigError, RunConfig};
-use crate::experiment::grid::{GridRun, RunKey};
+use crate::experiment::grid::{self, Grid, GridRun, GridText, RunKey};
 use crate::history::{Provenance, RunHistory};
+use crate::words::counted;
 
+/// Where the file is kept as it was given.
+const FILE: &str = "experiment.toml";
 /// Where it stands which of the file's grids is meant.
 const VARIANT: &str = "variant.txt";
 /// What it says of the small one.
@@ -51,6 +55,20 @@ pub enum FolderError {
 /// Results that do not belong to this grid or this program.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum Misfit {
+    /// The folder of another experiment, whose rows would be told with this one's.
+    #[error(
+        "{folder} holds another experiment, '{there}', with runs such as {run} that are none of '{here}'; choose another --out"
+    )]
+    OtherExperiment {
+        /// The folder.
+        folder: String,
+        /// Title of the experiment that it holds.
+        there: String,
+        /// One of its runs.
+        run: String,
+        /// Title of the one that was asked for.
+        here: String,
+    },
     /// A run of this name was done with other settings.
     #[error(
         "{run} is there already with {key} = {there}, but the file now says {here}; put it back, or choose another --out"
@@ -67,7 +85,7 @@ pub enum Misfit {
     },
     /// Runs that another version of the program made or began.
     #[error(
-        "{n} runs there are of revision {there}, this program is {here} (the first: {run}); their numbers may differ for that alone. Choose another --out, or allow it with --mixed"
+        "{} of revision {there}, this program is {here} (the first: {run}); their numbers may differ for that alone. Choose another --out, or allow it with --mixed", counted(*n as u64, "run there is", "runs there are")
     )]
     OtherRevision {
         /// How many.
@@ -112,8 +130,50 @@ impl GridFolder {
     /// # Errors
     /// When the disk refuses.
     pub fn keep_file(&self, text: &str, is_small: bool) -> Result<(), FolderError> {
-        self.replace("experiment.toml", text)?;
+        self.replace(FILE, text)?;
         self.replace(VARIANT, if is_small { SMALL } else { "whole" })
+    }
+
+    /// Refuses the folder of another experiment: of another title, with runs that this one has not,
+    /// or without any run in common, seeds aside. A file that was edited otherwise goes on.
+    ///
+    /// # Errors
+    /// [`Misfit::OtherExperiment`] names both.
+    pub fn check_experiment(&self, grid: &Grid) -> Result<(), FolderError> {
+        let Some(there) = self.kept() else {
+            return Ok(());
+        };
+        let combination = |run: &GridRun| RunKey {
+            seed: 0,
+            ..run.key.clone()
+        };
+        let own: BTreeSet<RunKey> = grid.runs.iter().map(combination).collect();
+        let is_foreign = |run: &&GridRun| !own.contains(&combination(run));
+        let foreign: Vec<&GridRun> = there.runs.iter().filter(is_foreign).collect();
+        // Earlier revisions kept no variant; the runs that are looked at may not be those meant.
+        let is_apart = foreign.len() == there.runs.len() && self.root.join(VARIANT).exists();
+        match foreign.first() {
+            Some(run) if is_apart || there.title != grid.title => Err(Misfit::OtherExperiment {
+                folder: self.root.display().to_string(),
+                there: there.title.clone(),
+                run: run.key.name(),
+                here: grid.title.clone(),
+            }
+            .into()),
+            _ => Ok(()),
+        }
+    }
+
+    /// The experiment of the file that is kept here; `None` where there is none that this program
+    /// can read.
+    fn kept(&self) -> Option<Grid> {
+        let path = self.root.join(FILE);
+        let (name, text) = (path.display().to_string(), fs::read_to_string(&path).ok()?);
+        let source = GridText {
+            name: &name,
+            text: &text,
+        };
+        grid::resolve(source, self.is_small()).ok()
     }
 
     /// Whether it is of the small variant; no folder of the program's earlier revisions says so.

@@ -1,5 +1,5 @@
 use super::*;
-use crate::experiment::grid::GridRun;
+use crate::experiment::grid::{self, Grid, GridRun, GridText};
 use crate::history::Provenance;
 
 const METRICS: &str = "{\"kind\":\"evaluation\",\"step\":500,\"labels\":4,\"episodes\":10,\"success_rate\":0.5,\
@@ -136,6 +136,46 @@ fn a_folder_keeps_which_variant_it_is_and_is_whole_where_none_is_told() {
     assert!(folder.is_small());
     folder.keep_file("title = \"Labels\"", false).unwrap();
     assert!(!folder.is_small());
+}
+
+/// The file of a grid on the small task, and what it stands for.
+fn grid_of(title: &str, axes: &str) -> (String, Grid) {
+    let text = format!("title = \"{title}\"\n[axes]\ntasks = [\"go-fetch-return\"]\n{axes}\n");
+    let source = GridText {
+        name: "grid.toml",
+        text: &text,
+    };
+    let grid = grid::resolve(source, false).unwrap();
+    (text, grid)
+}
+
+#[test]
+fn a_folder_of_another_experiment_is_named_and_an_edited_file_goes_on() {
+    let (_place, folder) = Place::new("other");
+    let (text, grid) = grid_of("Two methods", "methods = [\"stair\", \"pebble\"]");
+    folder.check_experiment(&grid).unwrap(); // of none yet
+    folder.keep_file(&text, false).unwrap();
+    for (title, axes) in [
+        (
+            "Two methods",
+            "methods = [\"stair\", \"pebble\"]\nseeds = [7, 8]",
+        ),
+        ("Two methods", "methods = [\"stair\"]"),
+        ("Three", "methods = [\"stair\", \"pebble\", \"uniform\"]"),
+    ] {
+        let edited = grid_of(title, axes).1;
+        folder.check_experiment(&edited).unwrap();
+    }
+    for (title, axes, missing) in [
+        ("One method", "methods = [\"stair\"]", "pebble.oracle.1"),
+        ("Two methods", "methods = [\"uniform\"]", "stair.oracle.1"),
+    ] {
+        let other = grid_of(title, axes).1;
+        let told = folder.check_experiment(&other).unwrap_err().to_string();
+        for word in ["'Two methods'", title, missing, "--out"] {
+            assert!(told.contains(word), "'{word}' is not in: {told}");
+        }
+    }
 }
 
 #[test]

@@ -129,6 +129,18 @@ fn wrist_and_fingers_follow_their_commands_as_recorded() {
     }
 }
 
+/// A start may have joint 6 beyond what its servo takes (2.1817); the end effector is still asked
+/// to stay where it is, wrist and fingers only where their servos can bring them.
+#[test]
+fn what_is_asked_of_the_arm_ends_at_the_servos_only_for_wrist_and_fingers() {
+    let mut q = panda::HOME;
+    q[5] = 2.195;
+    q[6] = 2.96;
+    let targets = panda::targets(&q, &[0.0, 0.0, 0.0, 1.0, 1.0]);
+    assert_eq!(targets[..6], q[..6]);
+    assert_eq!(targets[6..], [2.9671, 0.04, 0.04]);
+}
+
 /// DYNAMICS R5: change of one joint whose target is 0.1 rad away, after 0.02, 0.1, 0.2 and 0.5 s.
 #[test]
 fn each_joint_follows_a_step_as_recorded() {
