@@ -103,7 +103,6 @@ pub const REFERENCES: [Reference; 7] = [
     // and after 3 to 4 seconds the hand slips in, pushes the lever back and has to start anew.
     Reference {
         expert_return: 0.25,
-        random_return: 0.4,
         ..reference(
             "door-unlock",
             [
