@@ -2,6 +2,7 @@
 
 mod blinding;
 mod clips;
+pub(crate) mod compare;
 mod labelers;
 mod labels_page;
 mod leases;

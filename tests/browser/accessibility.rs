@@ -5,6 +5,7 @@ use serde_json::json;
 
 use super::driver::{Browser, Scheme};
 use super::labeler::{Desk, answer, answer_any};
+use crate::api::compare::two_runs;
 use crate::api::studies::Open;
 
 /// axe-core, unchanged; its version, hash and licence lie beside it.
@@ -118,6 +119,33 @@ async fn axe_finds_nothing_on_the_pages_of_a_study() {
     study.close();
     browser.goto(&page("/seat")).await;
     look("closed", &browser).await;
+}
+
+/// The list of runs with a box at each, and the runs that were ticked side by side.
+#[tokio::test(flavor = "multi_thread")]
+async fn axe_finds_nothing_where_runs_are_compared() {
+    let Some(browser) = Browser::open(Scheme::Dark, (360, 740)).await else {
+        return;
+    };
+    let app = tokio::task::spawn_blocking(|| two_runs([3, 2]));
+    let app = app.await.expect("two runs");
+    browser
+        .goto(&format!("http://{}/", app.server.address))
+        .await;
+    look("runs to choose", &browser).await;
+    browser
+        .value(
+            "(document.querySelectorAll('input[name=run]').forEach((box) => box.click()),
+              document.querySelector('#compare button').click(), true)",
+        )
+        .await;
+    browser
+        .until(
+            "location.pathname === '/compare' && document.images.length === 3
+             && [...document.images].every((image) => image.naturalWidth > 0)",
+        )
+        .await;
+    look("compare", &browser).await;
 }
 
 /// Opens all that a page keeps folded.

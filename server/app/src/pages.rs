@@ -3,6 +3,7 @@
 //! Pages work with forms and links; scripts add keys, preloading and live curves.
 
 pub mod api;
+pub mod compare;
 pub mod experiment;
 pub mod experiments;
 pub mod guidance;

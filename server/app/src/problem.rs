@@ -219,6 +219,16 @@ impl Problem {
         )
     }
 
+    /// 404: curves of runs that were not tried yet.
+    pub fn no_trial(detail: impl Into<String>) -> Self {
+        Self::new(
+            StatusCode::NOT_FOUND,
+            "/problems/no-trial",
+            "There is nothing to draw yet",
+            detail,
+        )
+    }
+
     /// 416: a part that a clip does not have.
     pub fn no_such_range() -> Self {
         Self::new(

@@ -34,6 +34,8 @@ pub fn router(state: AppState) -> Router {
         .route("/runs/{id}/resume", post(pages::run::resume))
         .route("/runs/{id}/stop", post(pages::run::stop))
         .route("/runs/{id}/temporal-map.svg", get(pages::run::map::picture))
+        .route("/compare", get(pages::compare::page))
+        .route("/compare/{file}", get(pages::compare::picture))
         .route("/labels", get(pages::labels::page))
         .route("/api", get(pages::api::page))
         .merge(experiments())

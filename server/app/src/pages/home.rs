@@ -35,6 +35,8 @@ struct HomePage {
     /// What is under way or can be taken up, and what is over; empty lists are left out.
     groups: Vec<RunGroup>,
     has_runs: bool,
+    /// Whether there are enough of them to be held against each other.
+    can_compare: bool,
 }
 
 /// Runs under one heading.
@@ -98,13 +100,16 @@ struct RunLine {
 /// # Errors
 /// A store that cannot be read.
 pub async fn page(State(app): State<AppState>) -> Result<Response, Problem> {
-    let groups = groups(run_lines(&app).await?);
+    let lines = run_lines(&app).await?;
+    let can_compare = lines.len() > 1;
+    let groups = groups(lines);
     Ok(show(&HomePage {
         tasks: sim::tasks::tasks().iter().map(card).collect(),
         methods: methods(),
         teachers: teachers(),
         presets: presets(),
         has_runs: !groups.is_empty(),
+        can_compare,
         groups,
     }))
 }

@@ -44,8 +44,6 @@ pub struct Reference {
     pub least_success: f64,
     /// How far the expert's return may be off, as a share.
     pub expert_return: f64,
-    /// How far the random policy's return may be off, as a share.
-    pub random_return: f64,
 }
 
 const fn figures(success: f64, task_return: f64, first_success: f64) -> Figures {
@@ -62,7 +60,6 @@ const fn reference(task: &'static str, figures: [Figures; 3]) -> Reference {
         figures,
         least_success: 0.95,
         expert_return: 0.15,
-        random_return: 0.25,
     }
 }
 
@@ -146,6 +143,8 @@ pub const REFERENCES: [Reference; 7] = [
 const NOISY_SUCCESS: f64 = 0.15;
 /// How far the expert's median first success may be off, as a share.
 const FIRST_SUCCESS: f64 = 0.25;
+/// How far the random policy's return may be off, as a share.
+const RANDOM_RETURN: f64 = 0.25;
 /// Most success of a random policy beyond the original's.
 const RANDOM_SUCCESS: f64 = 0.05;
 const NOISE: f64 = 0.3;
@@ -233,7 +232,7 @@ impl Reference {
         let share = match actor {
             Actor::Expert => self.expert_return,
             Actor::NoisyExpert => f64::INFINITY,
-            Actor::Random => self.random_return,
+            Actor::Random => RANDOM_RETURN,
         };
         let is_return_near = is_near(here.task_return, there.task_return, share);
         expect(
