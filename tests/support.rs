@@ -302,13 +302,16 @@ pub(crate) fn seed(folder: &Path, n_queries: u32) -> RunId {
             .offer(run, &queries, true)
             .await
             .expect("stored queries");
-        while let Some(job) = store.next_clip_job().await.expect("a job") {
-            let n = 2 * job.query.0.unsigned_abs();
-            store
-                .attach_clips(job.query, &clip(n), &clip(n + 1))
-                .await
-                .expect("stored clips");
-        }
+        draw_all(&store).await;
         run
     })
+}
+
+/// Gives every query that waits for clips two of its own.
+pub(crate) async fn draw_all(store: &Store) {
+    while let Some(job) = store.next_clip_job().await.expect("a job") {
+        let n = 2 * job.query.0.unsigned_abs();
+        let attached = store.attach_clips(job.query, &clip(n), &clip(n + 1)).await;
+        attached.expect("stored clips");
+    }
 }

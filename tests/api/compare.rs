@@ -4,7 +4,7 @@ use domain::query::Question;
 use serde_json::json;
 use store::{ItemRole, NewItem, NewRun, NewStudy, RunId, Store};
 
-use crate::support::{TestApp, clip, collection, query};
+use crate::support::{TestApp, collection, draw_all, query};
 
 /// A server with runs 1 and 2, which differ in their seed and were tried so often.
 pub(crate) fn two_runs(n_trials: [u32; 2]) -> TestApp {
@@ -175,11 +175,7 @@ async fn add_study(store: &Store) {
     let tasks = ["go-fetch-return".to_owned()];
     let added = store.add_items(study, &tasks, vec![item]).await;
     added.expect("a pair");
-    while let Some(job) = store.next_clip_job().await.expect("a read") {
-        let n = 2 * job.query.0.unsigned_abs();
-        let attached = store.attach_clips(job.query, &clip(n), &clip(n + 1)).await;
-        attached.expect("clips");
-    }
+    draw_all(store).await;
 }
 
 #[test]

@@ -10,7 +10,7 @@ use store::{ItemRole, NewItem, NewStudy, Store};
 
 use super::studies::Open;
 use crate::stories::server_process::TOKEN;
-use crate::support::{Client, TestApp, clip, query};
+use crate::support::{Client, TestApp, draw_all, query};
 
 /// The words of a page with this behind its question mark.
 fn page(who: &Client, filters: &str) -> String {
@@ -256,11 +256,7 @@ async fn fill(folder: &Path) {
     let tasks = ["go-fetch-return".to_owned()];
     let added = store.add_items(id, &tasks, items.to_vec()).await;
     added.expect("pairs");
-    while let Some(job) = store.next_clip_job().await.expect("a read") {
-        let n = 2 * job.query.0.unsigned_abs();
-        let attached = store.attach_clips(job.query, &clip(n), &clip(n + 1)).await;
-        attached.expect("clips");
-    }
+    draw_all(&store).await;
 }
 
 #[test]

@@ -106,7 +106,7 @@ function tellStuck() {
 /** Puts the next prepared pair on, or says what is being waited for. */
 function proceed() {
   if (current || turningBack) return;
-  if (stuck) return tellStuck();
+  if (stuck && !interrupted) return tellStuck();
   const next = interrupted ?? ready.take();
   interrupted = null;
   if (next) show(next, null);

@@ -108,6 +108,16 @@ pub enum LabelsOf {
     Study(StudyId),
 }
 
+impl LabelsOf {
+    /// The numbers that a query binds: of the run, or of the study.
+    pub(crate) fn ids(self) -> (Option<i64>, Option<i64>) {
+        match self {
+            Self::Run(run) => (Some(run.0), None),
+            Self::Study(study) => (None, Some(study.0)),
+        }
+    }
+}
+
 /// Some answers of many.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LabelPage {
@@ -281,10 +291,7 @@ impl Store {
         after: i64,
         limit: u32,
     ) -> Result<LabelPage, StoreError> {
-        let (run, study) = match of {
-            LabelsOf::Run(run) => (Some(run.0), None),
-            LabelsOf::Study(study) => (None, Some(study.0)),
-        };
+        let (run, study) = of.ids();
         let page = "where (answer.run_id = ?1 or run.study_id = ?2) and answer.rowid > ?3
             order by answer.rowid limit ?4";
         let rows = sqlx::query(sqlx::AssertSqlSafe(format!("{} {page}", select())))

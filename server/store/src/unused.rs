@@ -34,10 +34,7 @@ impl Store {
         of: LabelsOf,
         limit: u32,
     ) -> Result<Vec<PassedOver>, StoreError> {
-        let (run, study) = match of {
-            LabelsOf::Run(run) => (Some(run.0), None),
-            LabelsOf::Study(study) => (None, Some(study.0)),
-        };
+        let (run, study) = of.ids();
         let rows = sqlx::query(
             "select coalesce(study_item.query_id, query.id), query.session, labeler.name, answer.reason
              from answer

@@ -1,7 +1,7 @@
 //! `stair export`: a run's answers as a table.
 
 use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Duration;
@@ -69,15 +69,46 @@ pub(super) fn write_to(
     let told = || format!("cannot write {}", path.display());
     // Beside it first: a table that ends early must not look whole.
     let part = path.with_added_extension("part");
-    let made = std::fs::create_dir_all(out::parent(path)).and_then(|()| File::create(&part));
-    let made = made.with_context(told).map_err(BadInput::from_error)?;
-    let mut file = BufWriter::new(made);
+    let mut file = LateFile::new(&part);
     let written = write(&mut file).and_then(|()| file.flush().with_context(told));
     if written.is_err() {
         let _ = std::fs::remove_file(&part); // it may be gone; the first error is told
     }
     written?;
     std::fs::rename(&part, path).with_context(told)
+}
+
+/// A file that is made, with its folder, when something is written or flushed: who is refused
+/// before that finds nothing new.
+struct LateFile<'p> {
+    path: &'p Path,
+    made: Option<BufWriter<File>>,
+}
+
+impl<'p> LateFile<'p> {
+    fn new(path: &'p Path) -> Self {
+        Self { path, made: None }
+    }
+
+    fn file(&mut self) -> io::Result<&mut BufWriter<File>> {
+        if self.made.is_none() {
+            std::fs::create_dir_all(out::parent(self.path))?;
+        }
+        match &mut self.made {
+            Some(file) => Ok(file),
+            made => Ok(made.insert(BufWriter::new(File::create(self.path)?))),
+        }
+    }
+}
+
+impl Write for LateFile<'_> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.file()?.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file()?.flush()
+    }
 }
 
 /// What is exported: `runs` or `studies`, with the number that was typed.
@@ -149,4 +180,29 @@ async fn open(data: &Path) -> anyhow::Result<Store> {
         }
         error => BadInput::from_error(error),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_refused_table_leaves_nothing_and_an_empty_one_is_a_file() {
+        let here = tempfile::tempdir().unwrap();
+        let path = here.path().join("new/answers.csv");
+        let refused = write_to(Some(&path), |_| Err(BadInput("no such run".into()).into()));
+        assert_eq!(refused.unwrap_err().to_string(), "no such run");
+        assert_eq!(std::fs::read_dir(here.path()).unwrap().count(), 0);
+
+        write_to(Some(&path), |_| Ok(())).unwrap();
+        assert_eq!(std::fs::read(&path).unwrap(), b"");
+        let broken = write_to(Some(&path), |to| {
+            to.write_all(b"half a tab")?;
+            Err(BadInput("it broke off".into()).into())
+        });
+        broken.unwrap_err();
+        let names = std::fs::read_dir(path.parent().unwrap()).unwrap();
+        assert_eq!(names.count(), 1, "no half of a table beside the whole one");
+        assert_eq!(std::fs::read(&path).unwrap(), b"");
+    }
 }
